@@ -38,8 +38,10 @@ struct GemmOptions {
                           Tensor bias, // [groups, N] fp32, or none
                           const GemmOptions& options = {});
 
-// y = 0.5 x (1 + tanh(sqrt(2/pi) (x + 0.044715 x^3))); runs in the epilogue of the gemm that makes x
-[[nodiscard]] Tensor gelu(Graph& g, Tensor x); // [M, N] -> [M, N]
+// y = f(x): [M, N] -> [M, N]; each runs in the epilogue of the gemm or convolution that makes x
+[[nodiscard]] Tensor gelu(Graph& g, Tensor x);            // 0.5 x (1 + tanh(sqrt(2/pi) (x + 0.044715 x^3)))
+[[nodiscard]] Tensor silu(Graph& g, Tensor x);            // x / (1 + exp(-x))
+Tensor relu(Graph& g, Tensor x, const PartOf& part = {}); // max(x, 0); of a part, zeros fill the last 8 columns
 
 // rows of a table that modulate tokens: one row per timestep, chosen per token row
 struct Modulation {
@@ -55,12 +57,6 @@ struct Modulation {
                                Modulation gate, // N columns
                                Tensor residual, // [groups * M, N]
                                uint32_t groups = 1);
-
-// y = x / (1 + exp(-x)); runs in the epilogue of the gemm that makes x
-[[nodiscard]] Tensor silu(Graph& g, Tensor x); // [M, N] -> [M, N]
-
-// y = max(x, 0); runs in the epilogue of the gemm or convolution that makes x
-Tensor relu(Graph& g, Tensor x, const PartOf& part = {}); // [M, N] -> [M, N]; of a part, zeros fill the last 8 columns
 
 // y = residual + x; runs in the epilogue of the gemm that makes x
 Tensor add(Graph& g,

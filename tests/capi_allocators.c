@@ -6,7 +6,7 @@
  * status and a line, and nothing is lost.
  *
  *     capi_allocators MODEL */
-#include "tests/capi_street.h"
+#include "tests/support/capi_street.h"
 
 enum { WIDTH = 24, HEIGHT = 16, PIXELS = WIDTH * HEIGHT, MOST_CALLS = 100000 };
 

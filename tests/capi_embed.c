@@ -2,7 +2,7 @@
  * SPDX-License-Identifier: Apache-2.0
  *
  * A host in C: what it may get wrong, a context of its own, and a context on a device that it made itself. */
-#include "tests/capi_vulkan.h"
+#include "tests/support/capi_vulkan.h"
 
 static void knows_its_version(void)
 {

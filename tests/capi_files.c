@@ -5,7 +5,7 @@
  * its cache; and what an application may get wrong.
  *
  *     capi_files MODEL RENDERER FOLDER     FOLDER: for the cache, which is emptied */
-#include "tests/capi_street.h"
+#include "tests/support/capi_street.h"
 
 enum { WIDTH = 24, HEIGHT = 16, PIXELS = WIDTH * HEIGHT, MOST_FILES = 8 };
 

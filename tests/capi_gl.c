@@ -5,7 +5,7 @@
  * gives without GL, in GL and GLES, by every way that the drivers here can go; GL's state stays as it was.
  *
  *     capi_gl MODEL RENDERER */
-#include "tests/capi_gl.h"
+#include "tests/support/capi_gl.h"
 
 static const char *model, *weights;
 

@@ -7,7 +7,7 @@
  * queue. Every semaphore is signalled and waited for in turns, and the bytes are those without GL.
  *
  *     capi_gl_semaphores MODEL */
-#include "tests/capi_gl.h"
+#include "tests/support/capi_gl.h"
 
 #include <fcntl.h>
 #include <unistd.h>

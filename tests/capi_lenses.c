@@ -5,8 +5,8 @@
  * what an application may get wrong. tests/capi_sensors.c has the numbers.
  *
  *     capi_lenses MODEL */
-#include "tests/capi_car.h"
-#include "tests/capi_memory.h"
+#include "tests/support/capi_car.h"
+#include "tests/support/capi_memory.h"
 
 #include <math.h>
 #include <time.h>

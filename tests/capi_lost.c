@@ -4,7 +4,7 @@
  * A host whose GPU is lost after some submits: each call says so with a status and a line, everything can be destroyed,
  * and another context goes on. The GPU is lost by the layer of tests/vendors/losing_gpu.cpp.
  *     capi_lost MODEL */
-#include "tests/capi_street.h"
+#include "tests/support/capi_street.h"
 
 #include <sys/wait.h>
 #include <unistd.h>

@@ -6,7 +6,7 @@
  *
  *     capi_model MODEL RENDERER RENDERER_OF_VIDEOS BOTH     MODEL: a voxfield transformer alone; BOTH: that and a
  * renderer, conditioned on objects */
-#include "tests/capi_street.h"
+#include "tests/support/capi_street.h"
 
 enum { GIVEN_UP = 20, MOST_CALLS = 4096 };
 

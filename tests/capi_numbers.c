@@ -4,7 +4,7 @@
  * An application in C whose floating numbers are wrong, one at a time: each is refused, and none taken as another.
  *
  *     capi_numbers MODEL     conditioned on objects */
-#include "tests/capi_street.h"
+#include "tests/support/capi_street.h"
 
 #include <math.h>
 #include <stddef.h>

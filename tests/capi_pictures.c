@@ -5,8 +5,8 @@
  * here in double; which formats are refused; and what one picture alone costs.
  *
  *     capi_pictures MODEL */
-#include "tests/capi_memory.h"
-#include "tests/capi_street.h"
+#include "tests/support/capi_memory.h"
+#include "tests/support/capi_street.h"
 
 #include <math.h>
 

@@ -5,7 +5,7 @@
  * second device its name.
  *
  *     capi_portable MODEL FOLDER fill|find */
-#include "tests/capi_street.h"
+#include "tests/support/capi_street.h"
 
 static const char *model, *folder;
 

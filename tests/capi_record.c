@@ -7,8 +7,8 @@
  *     capi_record MODEL CACHE
  *
  * CACHE: where contexts of our own keep a file. */
-#include "tests/capi_memory.h"
-#include "tests/capi_street.h"
+#include "tests/support/capi_memory.h"
+#include "tests/support/capi_street.h"
 
 #include <math.h>
 

@@ -5,9 +5,9 @@
  * wrong. The frames are those of `semrover refine` for the same buffers.
  *
  *     capi_refine MODEL RENDERER RENDERER_OF_VIDEOS SEMROVER FOLDER */
-#include "tests/capi_memory.h"
-#include "tests/capi_png.h"
-#include "tests/capi_street.h"
+#include "tests/support/capi_memory.h"
+#include "tests/support/capi_png.h"
+#include "tests/support/capi_street.h"
 
 #include <math.h>
 

@@ -5,7 +5,7 @@
  * driver does not have it, 77 says so.
  *
  *     capi_robust MODEL */
-#include "tests/capi_street.h"
+#include "tests/support/capi_street.h"
 
 enum { WIDTH = 24, HEIGHT = 16 };
 

@@ -5,8 +5,8 @@
  * numbers of `semrover render` of the same scene, rig and path.
  *
  *     capi_sensors MODEL SEMROVER FOLDER */
-#include "tests/capi_car.h"
-#include "tests/capi_png.h"
+#include "tests/support/capi_car.h"
+#include "tests/support/capi_png.h"
 
 #include <math.h>
 

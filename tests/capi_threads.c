@@ -4,8 +4,8 @@
  * Hosts with threads: contexts in parallel, one queue that two contexts and the host itself submit to, a context that
  * goes from thread to thread between calls, and one whose worker steps while frames are on their way. All of them see
  * the picture that one thread alone sees. `tools/test --threads` runs it under ThreadSanitizer, too. */
-#include "tests/capi_memory.h"
-#include "tests/capi_street.h"
+#include "tests/support/capi_memory.h"
+#include "tests/support/capi_street.h"
 
 #include <pthread.h>
 

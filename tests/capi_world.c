@@ -3,8 +3,8 @@
  *
  * A host in C that streams a world: labels of a grid and of a callback, budgets, edits, splats, pictures in host memory
  * and in buffers and images of its own device; and what it may get wrong. */
-#include "tests/capi_memory.h"
-#include "tests/capi_street.h"
+#include "tests/support/capi_memory.h"
+#include "tests/support/capi_street.h"
 
 #include <math.h>
 #include <time.h>

@@ -1,14 +1,15 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 // render --boxes, and what lies beside a drive's pictures
 #include "engine/annotation/box_lines.h"
 #include "engine/conditioning/scene_objects.h"
 #include "engine/format/image.h"
 #include "runtime/base/json.h"
-#include "tests/json_text.h"
-#include "tests/nuscenes_schema.h"
-#include "tests/program.h"
-#include "tests/renderer_folders.h"
+#include "tests/support/json_text.h"
+#include "tests/support/nuscenes_schema.h"
+#include "tests/support/program.h"
+#include "tests/support/renderer_folders.h"
 
 #include <algorithm>
 #include <gtest/gtest.h>

@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "engine/camera/rig.h"
 #include "engine/format/image.h"
 #include "engine/format/npy.h"
 #include "engine/scene/grid.h"
-#include "tests/child_program.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
+#include "tests/support/child_program.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
 #include "tools/trajectory/camera_path.h"
 
 #include <algorithm>

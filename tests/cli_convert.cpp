@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "engine/model/renderer_model.h"
 #include "engine/model/weight_blocks.h"
-#include "tests/checkpoint_values.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
-#include "tests/renderer_weights.h"
-#include "tests/says.h"
+#include "tests/support/checkpoint_values.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
+#include "tests/support/renderer_weights.h"
+#include "tests/support/says.h"
 
 namespace semrover {
 namespace cli_convert_test {

@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "engine/format/image.h"
 #include "engine/scene/grid.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
-#include "tests/zip_bytes.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
+#include "tests/support/zip_bytes.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "runtime/base/json.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
-#include "tests/renderer_folders.h"
-#include "tests/street_scene.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
+#include "tests/support/renderer_folders.h"
+#include "tests/support/street_scene.h"
 #include "tools/trajectory/camera_path.h"
 
 #include <algorithm>

@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "kernels/catalogue.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
 
 #include <algorithm>
 #include <gtest/gtest.h>

@@ -1,11 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "engine/scene/tiles.h"
 #include "runtime/base/dtype.h"
 #include "runtime/base/json.h"
-#include "tests/child_program.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
+#include "tests/support/child_program.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
 
 #include <algorithm>
 #include <cmath>

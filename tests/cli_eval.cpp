@@ -1,13 +1,14 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "engine/format/image.h"
 #include "engine/scene/grid.h"
 #include "engine/scene/scene_points.h"
-#include "tests/inception_reference.h"
-#include "tests/jpeg_file.h"
-#include "tests/json_text.h"
-#include "tests/pointnet_files.h"
-#include "tests/program.h"
+#include "tests/support/inception_reference.h"
+#include "tests/support/jpeg_file.h"
+#include "tests/support/json_text.h"
+#include "tests/support/pointnet_files.h"
+#include "tests/support/program.h"
 #include "tools/eval/features.h"
 
 #include <algorithm>

@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "engine/format/image.h"
 #include "engine/format/npy.h"
 #include "runtime/base/json.h"
-#include "tests/jpeg_file.h"
-#include "tests/json_text.h"
-#include "tests/png_file.h"
-#include "tests/program.h"
+#include "tests/support/jpeg_file.h"
+#include "tests/support/json_text.h"
+#include "tests/support/png_file.h"
+#include "tests/support/program.h"
 #include "tools/trajectory/camera_path.h"
 
 #include <algorithm>

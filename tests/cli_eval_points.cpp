@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "engine/scene/grid.h"
 #include "runtime/base/dtype.h"
 #include "runtime/base/json.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
 
 #include <algorithm>
 #include <gtest/gtest.h>

@@ -1,14 +1,15 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "engine/format/image.h"
 #include "engine/format/npy.h"
 #include "engine/scene/grid.h"
 #include "runtime/base/json.h"
-#include "tests/jpeg_file.h"
-#include "tests/json_text.h"
-#include "tests/png_file.h"
-#include "tests/program.h"
-#include "tests/street_scene.h"
+#include "tests/support/jpeg_file.h"
+#include "tests/support/json_text.h"
+#include "tests/support/png_file.h"
+#include "tests/support/program.h"
+#include "tests/support/street_scene.h"
 #include "tools/trajectory/camera_path.h"
 
 #include <cmath>

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/json_text.h"
-#include "tests/program.h"
-#include "tests/renderer_weights.h"
-#include "tests/safetensors_bytes.h"
+// needs: programs
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
+#include "tests/support/renderer_weights.h"
+#include "tests/support/safetensors_bytes.h"
 
 #include <algorithm>
 #include <gtest/gtest.h>

@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "engine/conditioning/cell_objects.h"
 #include "engine/format/image.h"
 #include "engine/scene/actors.h"
 #include "runtime/base/dtype.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
+#include "tests/support/scratch_folder.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "engine/camera/rigid.h"
 #include "engine/format/npy.h"
 #include "engine/scene/scene_points.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
+#include "tests/support/scratch_folder.h"
 
 #include <cmath>
 #include <nlohmann/json.hpp>

@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "engine/conditioning/scene_objects.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
 
 #include <nlohmann/json.hpp>
 

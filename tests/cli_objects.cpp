@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "engine/conditioning/cell_objects.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
+#include "tests/support/scratch_folder.h"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>

@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 // an option that does nothing with its input is a usage error that names both; advice in messages can be followed
-#include "tests/program.h"
-#include "tests/zip_bytes.h"
+#include "tests/support/program.h"
+#include "tests/support/zip_bytes.h"
 #include "tools/dataset/scene_readers.h"
 
 namespace semrover {

@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 // every option of every subcommand, as the program lists them, with values that mean nothing
 #include "runtime/base/json.h"
-#include "tests/program.h"
+#include "tests/support/program.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 // what `semrover page` writes: one file with everything in it, whatever the inputs say
 #include "engine/scene/palette.h"
 #include "runtime/base/dtype.h"
-#include "tests/json_text.h"
-#include "tests/page_inputs.h"
-#include "tests/program.h"
+#include "tests/support/json_text.h"
+#include "tests/support/page_inputs.h"
+#include "tests/support/program.h"
 #include "tools/page/page.h"
 
 #include <algorithm>

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 // what `semrover page` writes, in a browser: the page tries itself (assets/page/check.js) and reports
-#include "tests/json_text.h"
-#include "tests/page_inputs.h"
-#include "tests/program.h"
+#include "tests/support/json_text.h"
+#include "tests/support/page_inputs.h"
+#include "tests/support/program.h"
 
 #include <cstdlib>
 #include <cstring>

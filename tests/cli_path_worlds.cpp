@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 // trajectories and grids of data sets whose frames differ, in the data sets' own layouts: what is drawn has the depth
 // that rays through the voxels have
 #include "engine/format/image.h"
-#include "tests/program.h"
-#include "tests/zip_bytes.h"
+#include "tests/support/program.h"
+#include "tests/support/zip_bytes.h"
 #include "tools/trajectory/camera_path.h"
 
 #include <gtest/gtest.h>

@@ -3,7 +3,7 @@
 #include "tools/cli/progress.h"
 
 // note: the program's own files are in no library that a test could link
-#include "tests/json_text.h"
+#include "tests/support/json_text.h"
 #include "tools/cli/progress.cpp"
 
 #include <gtest/gtest.h>

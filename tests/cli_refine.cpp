@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "engine/format/image.h"
 #include "runtime/system/host_name.h"
-#include "tests/child_program.h"
-#include "tests/jpeg_file.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
-#include "tests/renderer_folders.h"
+#include "tests/support/child_program.h"
+#include "tests/support/jpeg_file.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
+#include "tests/support/renderer_folders.h"
 #include "tools/trajectory/camera_path.h"
 
 #include <algorithm>

@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 // `refine` with a renderer of videos
-#include "tests/child_program.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
-#include "tests/renderer_folders.h"
+#include "tests/support/child_program.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
+#include "tests/support/renderer_folders.h"
 
 #include <algorithm>
 #include <csignal>

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/child_program.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
-#include "tests/renderer_folders.h"
+// needs: programs
+#include "tests/support/child_program.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
+#include "tests/support/renderer_folders.h"
 
 #include <algorithm>
 #include <fstream>
@@ -126,7 +127,8 @@ TEST_F(CliRun, the_bytes_do_not_depend_on_parts)
     const Json whole = report();
     EXPECT_EQ(whole["done"], 9);
     const auto files = published();
-    // scene.sgrid of 3; of 6 drives 5 frames a scene with 5 buffers each, transforms.json; of that with times 3 files more
+    // scene.sgrid of 3; of 6 drives 5 frames a scene with 5 buffers each, transforms.json; of that with times 3 files
+    // more
     EXPECT_EQ(files.size(), 3u + 3u * (2u + 3u + 5u * 6u));
     EXPECT_EQ(attempts(), 0u);
     for (const int parts : {1, 3, 7}) {

@@ -1,8 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// every command ends soon after a signal, with code 130 and nothing half-written. tools/dev/signals measures more moments.
-#include "tests/child_program.h"
-#include "tests/program.h"
+// needs: programs
+// every command ends soon after a signal, with code 130 and nothing half-written. tools/dev/signals measures more
+// moments.
+#include "tests/support/child_program.h"
+#include "tests/support/program.h"
 
 #include <chrono>
 #include <cstdlib>

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 // outputs that are closed or full, and a cache that cannot be kept
-#include "tests/program.h"
+#include "tests/support/program.h"
 
 namespace semrover {
 namespace cli_streams_test {

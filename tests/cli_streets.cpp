@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "engine/conditioning/cell_objects.h"
 #include "engine/format/image.h"
 #include "engine/mesh/mesh_files.h"
 #include "engine/scene/actors.h"
 #include "runtime/base/json.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
 #include "tools/trajectory/camera_path.h"
 
 #include <algorithm>

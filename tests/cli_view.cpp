@@ -1,11 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 // `semrover view`: pictures with and without a window, voxels that are clicked and painted, paths that `render` reads
 #include "engine/scene/palette.h"
 #include "runtime/base/json.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
-#include "tests/renderer_folders.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
+#include "tests/support/renderer_folders.h"
 #include "tools/trajectory/camera_path.h"
 
 #include <cmath>

@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 #include "engine/scene/grid.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/dtype.h"
 #include "runtime/base/json.h"
-#include "tests/json_text.h"
-#include "tests/png_file.h"
-#include "tests/program.h"
+#include "tests/support/json_text.h"
+#include "tests/support/png_file.h"
+#include "tests/support/program.h"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: programs
 // `semrover bench world`: what a short flight reports, and the figures that it counts with
 #include "runtime/base/json.h"
-#include "tests/json_text.h"
-#include "tests/program.h"
+#include "tests/support/json_text.h"
+#include "tests/support/program.h"
 #include "tools/bench/call_times.h"
 
 namespace semrover {

@@ -3,7 +3,7 @@
 // which of a machine's devices a process takes, by what an engine's variables say; no device is asked
 #include "runtime/device/device_choice.h"
 
-#include "tests/says.h"
+#include "tests/support/says.h"
 
 #include <map>
 

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: posix
 // what a container lacks of a GPU's driver, in made-up roots
 #include "runtime/device/driver_gaps.h"
 
-#include "tests/scratch_folder.h"
+#include "tests/support/scratch_folder.h"
 
 #include <gtest/gtest.h>
 #include <map>

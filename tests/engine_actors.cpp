@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/scene/actors.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: posix
 // Small files that name much: each is refused, or read, within a stated share of memory (SECURITY.md, Limits)
 #include "engine/conditioning/scene_objects.h"
 #include "engine/format/labelled_points.h"
@@ -7,8 +8,8 @@
 #include "engine/mesh/mesh_files.h"
 #include "engine/mesh/surface_blocks.h"
 #include "engine/scene/palette.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 #include "tools/dataset/scene_readers.h"
 #include "tools/dataset/vox_file.h"
 

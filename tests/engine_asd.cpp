@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/deferred/frame_codec.h"
 #include "engine/deferred/memory_plan.h"
-#include "tests/golden_renderer.h"
+#include "tests/support/golden_renderer.h"
 
 #include <cmath>
 #include <limits>

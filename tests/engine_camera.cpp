@@ -3,8 +3,8 @@
 #include "engine/camera/camera_view.h"
 #include "engine/camera/rig.h"
 #include "engine/deferred/frame_images.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 #include "tools/trajectory/camera_path.h"
 
 #include <cmath>

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/camera/camera_view.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 #include "tools/trajectory/camera_path.h"
 
 #include <cmath>

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/camera/rig.h"
 #include "engine/splat/rasterizer.h"
-#include "tests/kernel_case.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/kernel_case.h"
+#include "tests/support/scratch_folder.h"
 #include "tools/trajectory/camera_path.h"
 #include "tools/trajectory/camera_text.h"
 

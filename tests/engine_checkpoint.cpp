@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/model/checkpoint.h"
 #include "engine/model/ldm_config.h"
-#include "tests/checkpoint_values.h"
-#include "tests/json_text.h"
-#include "tests/renderer_weights.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/checkpoint_values.h"
+#include "tests/support/json_text.h"
+#include "tests/support/renderer_weights.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
 #include <cmath>
 

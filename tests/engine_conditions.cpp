@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/conditioning/voxel_conditions.h"
 #include "engine/voxfield/token_sampler.h"
-#include "tests/json_text.h"
-#include "tests/says.h"
+#include "tests/support/json_text.h"
+#include "tests/support/says.h"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>

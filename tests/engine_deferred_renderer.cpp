@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 // frames of cameras, from splat buffers in memory: the bytes are those of encoder, denoiser and decoder by hand
 #include "engine/deferred/deferred_renderer.h"
-#include "tests/golden_renderer.h"
+#include "tests/support/golden_renderer.h"
 
 #include <cmath>
 #include <limits>

@@ -4,9 +4,9 @@
 #include "tools/dataset/dense_labels.h"
 #include "tools/dataset/scene_readers.h"
 
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
-#include "tests/zip_bytes.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
+#include "tests/support/zip_bytes.h"
 
 #include <cmath>
 #include <random>

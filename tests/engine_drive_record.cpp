@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/annotation/drive_record.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/scratch_folder.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

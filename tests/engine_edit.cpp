@@ -4,9 +4,9 @@
 #include "runtime/base/dtype.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/safetensors.h"
-#include "tests/json_text.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/json_text.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 #include "tools/editing/editing.h"
 #include "tools/editing/grid_editor.h"
 

@@ -3,9 +3,9 @@
 // drives in the layouts of other programs (tools/export), without a device
 #include "engine/format/npy.h"
 #include "engine/format/number_image.h"
-#include "tests/drive_folder.h"
-#include "tests/nuscenes_schema.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/drive_folder.h"
+#include "tests/support/nuscenes_schema.h"
+#include "tests/support/scratch_folder.h"
 #include "tools/dataset/object_boxes.h"
 #include "tools/dataset/pack_shards.h"
 #include "tools/export/exporters.h"

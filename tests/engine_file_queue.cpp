@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: posix
 #include "engine/job/file_queue.h"
 #include "runtime/base/made_files.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
 #include <atomic>
 #include <cstdlib>

@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/fusion/depth_frames.h"
 #include "engine/fusion/fuse.h"
-#include "tests/kernel_case.h"
-#include "tests/says.h"
-#include "tests/street_scene.h"
+#include "tests/support/kernel_case.h"
+#include "tests/support/says.h"
+#include "tests/support/street_scene.h"
 #include "tools/fuse/frame_pictures.h"
 
 #include <map>

@@ -5,9 +5,9 @@
 #include "engine/scene/palette.h"
 #include "runtime/base/dtype.h"
 #include "runtime/base/safetensors.h"
-#include "tests/grid_case.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/grid_case.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/conditioning/cell_objects.h"
 #include "engine/conditioning/guessed_objects.h"
-#include "tests/says.h"
+#include "tests/support/says.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,10 +4,10 @@
 #include "engine/format/npy.h"
 #include "engine/format/number_image.h"
 #include "runtime/base/dtype.h"
-#include "tests/jpeg_file.h"
-#include "tests/png_file.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/jpeg_file.h"
+#include "tests/support/png_file.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 #include "tools/dataset/depth_image.h"
 
 #include <cmath>

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/inception_reference.h"
-#include "tests/kernel_case.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+// needs: device
+#include "tests/support/inception_reference.h"
+#include "tests/support/kernel_case.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 #include "tools/eval/inception.h"
 
 namespace semrover {

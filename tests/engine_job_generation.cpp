@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 // worlds in the order of the scene, taken a piece at a time
 #include "engine/job/outputs.h"
 #include "engine/world/world.h"
-#include "tests/json_text.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/json_text.h"
+#include "tests/support/scratch_folder.h"
 
 #include <algorithm>
 #include <gtest/gtest.h>

@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/job/drawing.h"
 #include "engine/job/refinement.h"
 #include "engine/world/world.h"
-#include "tests/json_text.h"
-#include "tests/renderer_folders.h"
+#include "tests/support/json_text.h"
+#include "tests/support/renderer_folders.h"
 #include "tools/trajectory/camera_path.h"
 
 #include <nlohmann/json.hpp>

@@ -5,8 +5,8 @@
 #include "engine/format/ply_reader.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/dtype.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 #include "tools/dataset/object_boxes.h"
 #include "tools/dataset/scene_file.h"
 

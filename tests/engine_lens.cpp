@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/camera/lens.h"
-#include "tests/says.h"
+#include "tests/support/says.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

@@ -3,8 +3,8 @@
 #include "engine/camera/rig.h"
 #include "engine/job/lidar_returns.h"
 #include "engine/shards/shard_index.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
 #include <cmath>
 #include <cstring>

@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/model/low_rank.h"
 #include "engine/model/weight_blocks.h"
 #include "engine/voxfield/token_sampler.h"
 #include "runtime/base/json.h"
 #include "runtime/base/keyed_random.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
 #include <filesystem>
 #include <gtest/gtest.h>

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where the vertices of mesh files are: far from the origin, and where instances, skins and morph targets put them
 #include "engine/mesh/mesh_files.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

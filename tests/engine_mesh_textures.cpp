@@ -3,8 +3,8 @@
 // What mesh files say of materials: textures that are named in many ways, and where there is no surface
 #include "engine/mesh/mesh_files.h"
 #include "engine/mesh/transparency.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
 #include <cmath>
 #include <gtest/gtest.h>

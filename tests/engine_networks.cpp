@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/network/unet.h"
 #include "engine/network/vae.h"
 #include "runtime/base/json.h"
-#include "tests/feature_map_case.h"
+#include "tests/support/feature_map_case.h"
 
 #include <cmath>
 

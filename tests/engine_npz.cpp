@@ -5,10 +5,10 @@
 #include "tools/dataset/scene_file.h"
 #include "tools/dataset/scene_readers.h"
 
-#include "tests/grid_case.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
-#include "tests/zip_bytes.h"
+#include "tests/support/grid_case.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
+#include "tests/support/zip_bytes.h"
 
 #include <cmath>
 #include <numeric>

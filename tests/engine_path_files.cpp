@@ -4,8 +4,8 @@
 #include "engine/camera/camera_view.h"
 #include "engine/camera/rig.h"
 #include "engine/format/image.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 #include "tools/trajectory/camera_path.h"
 #include "tools/trajectory/camera_text.h"
 

@@ -4,8 +4,8 @@
 #include "engine/format/ply.h"
 #include "engine/format/ply_reader.h"
 
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
 #include <bit>
 #include <cmath>

@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/mesh/nearest.h"
-#include "tests/kernel_case.h"
-#include "tests/says.h"
+#include "tests/support/kernel_case.h"
+#include "tests/support/says.h"
 #include "tools/eval/point_scores.h"
 
 #include <algorithm>

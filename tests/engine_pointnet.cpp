@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/json_text.h"
-#include "tests/kernel_case.h"
-#include "tests/pointnet_files.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+// needs: device
+#include "tests/support/json_text.h"
+#include "tests/support/kernel_case.h"
+#include "tests/support/pointnet_files.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 #include "tools/eval/pointnet.h"
 
 #include <algorithm>

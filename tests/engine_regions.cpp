@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/regions.h"
-#include "tests/golden_tensors.h"
-#include "tests/json_text.h"
+#include "tests/support/golden_tensors.h"
+#include "tests/support/json_text.h"
 
 #include <algorithm>
 #include <chrono>

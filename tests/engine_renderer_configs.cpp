@@ -4,8 +4,8 @@
 #include "engine/model/unet_config.h"
 #include "engine/model/vae_config.h"
 #include "runtime/base/json.h"
-#include "tests/json_text.h"
-#include "tests/says.h"
+#include "tests/support/json_text.h"
+#include "tests/support/says.h"
 
 #include <map>
 

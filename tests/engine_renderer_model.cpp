@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/model/renderer_model.h"
-#include "tests/json_text.h"
-#include "tests/renderer_weights.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/json_text.h"
+#include "tests/support/renderer_weights.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
 namespace semrover {
 namespace engine_renderer_model_test {

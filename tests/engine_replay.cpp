@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 // runs of tokens and of frames, stopped between rows: the bytes are those of the uninterrupted run
 #include "engine/deferred/asd.h"
 #include "engine/voxfield/token_sampler.h"

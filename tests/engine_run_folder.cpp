@@ -1,11 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: posix
 // what others put into a run's folder
 #include "engine/job/outputs.h"
 #include "engine/world/region_store.h"
 #include "runtime/base/diagnostics.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
 #include <dlfcn.h>
 #include <sys/file.h>

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/voxfield/token_sampler.h"
-#include "tests/says.h"
+#include "tests/support/says.h"
 
 #include <gtest/gtest.h>
 

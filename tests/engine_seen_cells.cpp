@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/mesh/voxelizer.h"
-#include "tests/kernel_case.h"
+#include "tests/support/kernel_case.h"
 #include "tools/streets/street_grid.h"
 
 #include <gtest/gtest.h>

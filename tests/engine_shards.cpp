@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: posix
 #include "engine/shards/ustar.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/json.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 #include "tools/dataset/check_shards.h"
 #include "tools/dataset/pack_shards.h"
 

@@ -1,11 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/deferred/frame_images.h"
 #include "engine/splat/splat_pool.h"
-#include "tests/frame_pixels_reference.h"
-#include "tests/golden_tensors.h"
-#include "tests/json_text.h"
-#include "tests/splat_case.h"
+#include "tests/support/frame_pixels_reference.h"
+#include "tests/support/golden_tensors.h"
+#include "tests/support/json_text.h"
+#include "tests/support/splat_case.h"
 #include "tools/verify/splat_cases.cpp"
 #include "tools/verify/splat_cases.h"
 

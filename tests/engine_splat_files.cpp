@@ -6,10 +6,10 @@
 #include "engine/format/splat_file.h"
 
 #include "runtime/base/json.h"
-#include "tests/json_text.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
-#include "tests/zip_bytes.h"
+#include "tests/support/json_text.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
+#include "tests/support/zip_bytes.h"
 
 #include <algorithm>
 #include <cmath>

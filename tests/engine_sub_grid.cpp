@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/voxfield/sub_grid.h"
 
 #include "engine/scene/cell_reach.h"

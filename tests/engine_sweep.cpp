@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/job/lidar_returns.h"
-#include "tests/splat_case.h"
-#include "tests/sweep_case.h"
+#include "tests/support/splat_case.h"
+#include "tests/support/sweep_case.h"
 
 #include <numbers>
 

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/camera/camera_view.h"
 #include "engine/job/lidar_returns.h"
 #include "engine/scene/scene_points.h"
-#include "tests/sweep_case.h"
+#include "tests/support/sweep_case.h"
 #include "tools/streets/street_grid.h"
 #include "tools/trace/trace_scene.h"
 

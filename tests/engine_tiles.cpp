@@ -3,10 +3,10 @@
 #include "engine/scene/tiles.h"
 #include "runtime/base/dtype.h"
 #include "runtime/base/json.h"
-#include "tests/grid_case.h"
-#include "tests/json_text.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/grid_case.h"
+#include "tests/support/json_text.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,9 +5,9 @@
 #include "tools/dataset/vox_file.h"
 
 #include "engine/scene/palette.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
-#include "tests/zip_bytes.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
+#include "tests/support/zip_bytes.h"
 
 #include <algorithm>
 #include <random>

@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/mesh/voxelizer.h"
 
 #include "engine/mesh/chamfer.h"
 #include "engine/mesh/surface_blocks.h"
-#include "tests/clip_reference.h"
-#include "tests/kernel_case.h"
-#include "tests/says.h"
+#include "tests/support/clip_reference.h"
+#include "tests/support/kernel_case.h"
+#include "tests/support/says.h"
 
 #include <algorithm>
 #include <map>

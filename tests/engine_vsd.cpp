@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/deferred/frame_codec.h"
 #include "engine/deferred/vsd.h"
-#include "tests/golden_renderer.h"
-#include "tests/says.h"
+#include "tests/support/golden_renderer.h"
+#include "tests/support/says.h"
 
 #include <cmath>
 #include <limits>

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/model/weight_loader.h"
-#include "tests/kernel_case.h"
+#include "tests/support/kernel_case.h"
 
 namespace semrover {
 namespace engine_weight_loader_test {

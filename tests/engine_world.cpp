@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 // worlds that are generated around a camera: the way there, budgets, caches and edits change no byte
 #include "runtime/base/hash.h"
-#include "tests/json_text.h"
-#include "tests/world_case.h"
+#include "tests/support/json_text.h"
+#include "tests/support/world_case.h"
 
 namespace semrover {
 namespace engine_world_test {

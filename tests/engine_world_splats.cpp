@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 // splats of worlds: detail, borders, edits, room
-#include "tests/world_case.h"
+#include "tests/support/world_case.h"
 
 namespace semrover {
 namespace engine_world_splats_test {

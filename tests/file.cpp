@@ -1,11 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: posix
 #include "runtime/base/file.h"
 
 #include "runtime/base/quote.h"
 #include "runtime/system/host_name.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
 #include <chrono>
 #include <csignal>

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/kernel_case.h"
-#include "tests/random_graph.h"
+// needs: device
+#include "tests/support/kernel_case.h"
+#include "tests/support/random_graph.h"
 
 namespace semrover {
 namespace graph_execute_test {

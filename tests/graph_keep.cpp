@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/device/state.h"
-#include "tests/graph_memory.h"
+#include "tests/support/graph_memory.h"
 
 #include <gtest/gtest.h>
 
@@ -103,7 +103,7 @@ TEST(graph_keep, two_externals_of_the_same_memory_are_ordered_too)
                  b = wrong.external(memory, 16, 64, DType::f32, "b");
     const Tensor made = gelu(wrong, fake_external(wrong, 16, 64));
     (void)silu(wrong, a);
-    EXPECT_DEATH(wrong.keep(made, b), "'gelu' is kept in 'b', which silu uses after it is made");
+    EXPECT_DEATH(wrong.keep(made, b), "'gelu' is kept in 'b', which activation uses after it is made");
 }
 
 TEST(graph_keep, refuses_a_slot_whose_old_contents_are_still_read)
@@ -111,10 +111,10 @@ TEST(graph_keep, refuses_a_slot_whose_old_contents_are_still_read)
     KeepCase c;
     const Tensor made = gelu(c.g, c.x.in(c.g));
     (void)silu(c.g, c.y.in(c.g));
-    EXPECT_DEATH(c.g.keep(made, c.y), "'gelu' is kept in 'y', which silu uses after it is made");
+    EXPECT_DEATH(c.g.keep(made, c.y), "'gelu' is kept in 'y', which activation uses after it is made");
     KeepCase in_place;
     const Tensor own = gelu(in_place.g, in_place.x.in(in_place.g));
-    EXPECT_DEATH(in_place.g.keep(own, in_place.x), "'gelu' is kept in 'x', which gelu uses after it is made");
+    EXPECT_DEATH(in_place.g.keep(own, in_place.x), "'gelu' is kept in 'x', which activation uses after it is made");
 }
 
 TEST(graph_keep, refuses_what_does_not_fit_and_says_both)

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/graph_memory.h"
+#include "tests/support/graph_memory.h"
 
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ TEST(graph_misuse, names_pass_and_tensor_that_is_read_before_it_is_written)
     (void)silu(g, g.matrix(16, 64, DType::f32, "nowhere"));
     const Error e = error_of(g);
     EXPECT_EQ(e.code, ErrorCode::internal);
-    EXPECT_EQ(e.message, "pass 1 (silu): binding X reads 'nowhere', which nothing has written");
+    EXPECT_EQ(e.message, "pass 1 (activation): binding X reads 'nowhere', which nothing has written");
 }
 
 TEST(graph_misuse, names_a_tensor_whose_type_a_shader_does_not_take)
@@ -45,7 +45,7 @@ TEST(graph_misuse, wants_every_byte_written_that_is_read)
     const Tensor x = fake_external(g, 16, 64), half = g.matrix(32, 64, DType::f32, "half");
     add(g, x, x, {half, 16});
     (void)gelu(g, half);
-    EXPECT_EQ(error_of(g).message, "pass 1 (gelu): binding X reads 'half', which nothing has written");
+    EXPECT_EQ(error_of(g).message, "pass 1 (activation): binding X reads 'half', which nothing has written");
     Graph whole(test_limits());
     const Tensor y = fake_external(whole, 16, 64), both = whole.matrix(32, 64, DType::f32, "both");
     add(whole, y, y, {both, 16});
@@ -59,7 +59,7 @@ TEST(graph_misuse, names_a_range_that_leaves_its_tensor)
     Graph g(test_limits());
     const Tensor x = fake_external(g, 16, 64, DType::f32, "small");
     (void)gelu(g, x.row_range(10, 16));
-    EXPECT_EQ(error_of(g).message, "pass 0 (gelu): binding X reaches byte 6656 of 'small', which has 4096");
+    EXPECT_EQ(error_of(g).message, "pass 0 (activation): binding X reaches byte 6656 of 'small', which has 4096");
     Graph h(test_limits());
     const Tensor y = h.matrix(16, 64, DType::f32, "target"), z = fake_external(h, 16, 64);
     add(h, z, z, {y, 1});
@@ -97,7 +97,7 @@ TEST(graph_misuse, refuses_rows_that_do_not_fit_a_binding_one_by_one)
     (void)gelu(g, fake_external(g, 4, 40000, DType::f32, "wide"));
     const Error e = error_of(g);
     EXPECT_EQ(e.code, ErrorCode::out_of_memory);
-    EXPECT_EQ(e.message, "gelu: 1 rows of binding X ('wide') are 160000 bytes; this device binds at most 65536");
+    EXPECT_EQ(e.message, "activation: 1 rows of binding X ('wide') are 160000 bytes; this device binds at most 65536");
 }
 
 TEST(graph_misuse, names_the_kernel_that_no_variant_of_runs)
@@ -108,9 +108,10 @@ TEST(graph_misuse, names_the_kernel_that_no_variant_of_runs)
     (void)gelu(g, fake_external(g, 4, 64));
     const Error e = error_of(g);
     EXPECT_EQ(e.code, ErrorCode::no_device);
-    EXPECT_EQ(e.message,
-              "no variant of kernel 'gelu' runs on this device (16384 bytes of shared memory, 16 threads a group, 16 "
-              "storage buffers a shader)");
+    EXPECT_EQ(
+        e.message,
+        "no variant of kernel 'activation' runs on this device (16384 bytes of shared memory, 16 threads a group, "
+        "16 storage buffers a shader)");
     limits = test_limits();
     limits.max_storage_buffers = 1; // x and y are two
     Graph one(limits);
@@ -130,7 +131,7 @@ TEST(graph_misuse, refuses_more_workgroups_than_both_dimensions_take)
     (void)gelu(g, fake_external(g, 1000, 64));
     const Error e = error_of(g);
     EXPECT_EQ(e.code, ErrorCode::out_of_memory);
-    EXPECT_EQ(e.message, "gelu: 16 workgroups in dimension 1, the device takes 1..8");
+    EXPECT_EQ(e.message, "activation: 16 workgroups in dimension 1, the device takes 1..8");
 }
 
 using graph_misuse_death = testing::Test;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/graph_memory.h"
-#include "tests/random_graph.h"
+#include "tests/support/graph_memory.h"
+#include "tests/support/random_graph.h"
 
 #include <gtest/gtest.h>
 

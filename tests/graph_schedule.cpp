@@ -3,7 +3,7 @@
 #include "kernels/network.h"
 #include "kernels/sort.h"
 #include "runtime/graph/cost_model.h"
-#include "tests/graph_memory.h"
+#include "tests/support/graph_memory.h"
 
 #include <gtest/gtest.h>
 
@@ -93,6 +93,27 @@ TEST(graph_schedule, fills_a_submit_with_short_passes)
     const Plan plan = planned(g);
     EXPECT_EQ(plan.dispatches.size(), 12u);
     EXPECT_EQ(plan.submits, 4u);
+}
+
+// a barrier between levels, and one at the end of a submit; submits are cut again once passes are measured
+TEST(graph_schedule, counts_dispatches_and_barriers_of_one_run)
+{
+    DeviceLimits limits = test_limits();
+    limits.submit_seconds = 0.1;
+    Graph g(limits);
+    const Tensor x = fake_external(g, 16, 64), y = fake_external(g, 16, 64);
+    const Tensor a = gelu(g, x), b = silu(g, y);
+    (void)add(g, a, b);
+    Plan plan = planned(g);
+    EXPECT_EQ(levels_text(plan), "gelu silu | add");
+    EXPECT_EQ(plan.dispatches.size(), 3u);
+    EXPECT_EQ(plan.barriers(), 2u);
+    stage::submits(plan, limits, std::vector<double>{1, 1, 1}); // a submit each: a group of workgroups is the least
+    EXPECT_EQ(plan.submits, plan.dispatches.size());
+    EXPECT_EQ(plan.barriers(), plan.submits);
+    stage::submits(plan, limits, std::vector<double>{0.01, 0.01, 0.01});
+    EXPECT_EQ(plan.dispatches.size(), 3u);
+    EXPECT_EQ(plan.barriers(), 2u);
 }
 
 // measured seconds of passes of all kinds of grids

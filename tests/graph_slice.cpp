@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/graph_memory.h"
+#include "tests/support/graph_memory.h"
 
 #include <gtest/gtest.h>
 

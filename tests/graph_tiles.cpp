@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/graph/autotuner.h"
-#include "tests/graph_memory.h"
+#include "tests/support/graph_memory.h"
 
 namespace semrover {
 namespace graph_tiles_test {

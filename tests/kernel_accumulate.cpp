@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 // accumulate() against docs/method.md §6.5 in double, for every lens
 #include "engine/camera/lens.h"
 #include "engine/splat/camera_pair.h"
 #include "kernels/picture.h"
-#include "tests/kernel_case.h"
+#include "tests/support/kernel_case.h"
 
 #include <cmath>
 #include <optional>

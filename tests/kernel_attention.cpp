@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "attention.spv.h"
 #include "runtime/graph/variant.h"
-#include "tests/attention_sets.h"
-#include "tests/softmax_sum.h"
+#include "tests/support/attention_sets.h"
+#include "tests/support/softmax_sum.h"
 
 namespace semrover {
 namespace kernel_attention_test {

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 // files decide what shaders read: an index beyond a tensor does not leave it
 #include "beyond.spv.h"
-#include "tests/kernel_case.h"
 #include "tests/shaders/beyond.h"
+#include "tests/support/kernel_case.h"
 
 #include <algorithm>
 

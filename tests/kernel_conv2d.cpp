@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/feature_map_case.h"
+// needs: device
+#include "tests/support/feature_map_case.h"
 
 #include <cmath>
 
@@ -8,29 +9,44 @@ namespace semrover {
 namespace kernel_conv2d_test {
 
 struct ConvCase {
-    uint32_t batch, height, width, channels, channels2, outputs, kernel, stride;
-    bool end_padding;
-    uint32_t up_height, up_width;
-    bool bias, shift, silu, residual;
+    uint32_t batch = 1, height = 1, width = 1, channels = 1, channels2 = 0, outputs = 1, kernel = 3, stride = 1;
+    bool end_padding = false;
+    uint32_t up_height = 0, up_width = 0; // 0: not upsampled
+    bool bias = true, shift = false, silu = false, residual = false;
 };
 
 // one pixel; aligned; odd sizes and channels; two inputs; strides and paddings; upsampling to even and odd sizes; every
 // epilogue; more than one tile of every variant; a K that GPUs cut into slices, in long steps or not
 const ConvCase kCases[] = {
-    {1, 1, 1, 1, 0, 1, 3, 1, false, 0, 0, false, false, false, false},
-    {1, 4, 4, 8, 0, 16, 3, 1, false, 0, 0, true, false, false, false},
-    {2, 5, 7, 13, 0, 20, 3, 1, false, 0, 0, true, true, false, false},
-    {1, 9, 6, 16, 8, 24, 3, 1, false, 0, 0, true, false, false, true},
-    {2, 3, 5, 24, 11, 9, 1, 1, false, 0, 0, true, false, false, true},
-    {1, 7, 9, 8, 0, 40, 3, 2, false, 0, 0, true, false, true, false},
-    {2, 8, 6, 8, 0, 12, 3, 2, true, 0, 0, true, false, false, false},
-    {1, 7, 5, 16, 0, 8, 3, 2, true, 0, 0, false, false, false, false},
-    {1, 4, 5, 8, 0, 8, 3, 1, false, 8, 10, true, false, false, false},
-    {2, 4, 5, 8, 0, 8, 3, 1, false, 7, 9, true, false, false, false},
-    {2, 11, 13, 40, 0, 72, 3, 1, false, 0, 0, true, true, false, true},
-    {2, 23, 24, 8, 0, 509, 3, 1, false, 0, 0, true, true, false, true},
-    {2, 3, 4, 264, 250, 72, 3, 1, false, 0, 0, true, true, true, true},
-    {1, 3, 4, 256, 250, 72, 3, 1, false, 0, 0, true, true, true, true},
+    {.height = 1, .width = 1, .channels = 1, .outputs = 1, .bias = false},
+    {.height = 4, .width = 4, .channels = 8, .outputs = 16},
+    {.batch = 2, .height = 5, .width = 7, .channels = 13, .outputs = 20, .shift = true},
+    {.height = 9, .width = 6, .channels = 16, .channels2 = 8, .outputs = 24, .residual = true},
+    {.batch = 2, .height = 3, .width = 5, .channels = 24, .channels2 = 11, .outputs = 9, .kernel = 1, .residual = true},
+    {.height = 7, .width = 9, .channels = 8, .outputs = 40, .stride = 2, .silu = true},
+    {.batch = 2, .height = 8, .width = 6, .channels = 8, .outputs = 12, .stride = 2, .end_padding = true},
+    {.height = 7, .width = 5, .channels = 16, .outputs = 8, .stride = 2, .end_padding = true, .bias = false},
+    {.height = 4, .width = 5, .channels = 8, .outputs = 8, .up_height = 8, .up_width = 10},
+    {.batch = 2, .height = 4, .width = 5, .channels = 8, .outputs = 8, .up_height = 7, .up_width = 9},
+    {.batch = 2, .height = 11, .width = 13, .channels = 40, .outputs = 72, .shift = true, .residual = true},
+    {.batch = 2, .height = 23, .width = 24, .channels = 8, .outputs = 509, .shift = true, .residual = true},
+    {.batch = 2,
+     .height = 3,
+     .width = 4,
+     .channels = 264,
+     .channels2 = 250,
+     .outputs = 72,
+     .shift = true,
+     .silu = true,
+     .residual = true},
+    {.height = 3,
+     .width = 4,
+     .channels = 256,
+     .channels2 = 250,
+     .outputs = 72,
+     .shift = true,
+     .silu = true,
+     .residual = true},
 };
 
 // whole blocks of a tap's channels: one input, two, a kernel of one tap, stride, upsampling, and more scales than a
@@ -158,8 +174,9 @@ TEST(kernel_conv2d, takes_weights_of_another_type_than_its_input)
 // an image alone, and beside others that make a GPU's tiles larger: output and moments
 TEST(kernel_conv2d, gives_an_image_the_same_bits_beside_others)
 {
-    const ConvCase wide{24, 7, 9, 16, 8, 520, 3, 1, false, 0, 0, true, false, false, true},
-        deep{6, 7, 9, 256, 56, 72, 3, 1, false, 0, 0, true, false, false, true};
+    const ConvCase wide{
+        .batch = 24, .height = 7, .width = 9, .channels = 16, .channels2 = 8, .outputs = 520, .residual = true},
+        deep{.batch = 6, .height = 7, .width = 9, .channels = 256, .channels2 = 56, .outputs = 72, .residual = true};
     for (const auto& [c, dtype] : {std::pair{wide, DType::f32}, {wide, DType::f16}, {deep, DType::f16}}) {
         std::vector<float> results[2];
         for (const uint32_t batch : {c.batch, 1u}) {
@@ -219,13 +236,16 @@ TEST(kernel_conv2d, gives_the_same_bits_in_bands_of_rows)
         DType dtype;
         const char* limits;
     };
-    const char* low = "range=32768,texels=2048";
-    for (const Case& t : {Case{{2, 37, 23, 16, 8, 24, 3, 1, false, 0, 0, true, true, false, true}, DType::f32, low},
-                          Case{{1, 38, 22, 16, 0, 24, 3, 2, true, 0, 0, true, false, false, false}, DType::f32, low},
-                          Case{{1, 19, 23, 16, 0, 24, 3, 1, false, 37, 45, true, false, false, false}, DType::f32, low},
-                          Case{{24, 7, 9, 256, 56, 72, 3, 1, false, 0, 0, true, true, false, true},
-                               DType::f16,
-                               "range=450000,texels=28125"}}) {
+    ConvCase two{.height = 37, .width = 23, .channels = 16, .channels2 = 8, .outputs = 24, .shift = true},
+        strided{.height = 38, .width = 22, .channels = 16, .outputs = 24, .stride = 2, .end_padding = true},
+        upsampled{.height = 19, .width = 23, .channels = 16, .outputs = 24, .up_height = 37, .up_width = 45},
+        deep{.height = 7, .width = 9, .channels = 256, .channels2 = 56, .outputs = 72, .shift = true};
+    two.batch = 2;
+    deep.batch = 24;
+    two.residual = deep.residual = true;
+    const char *low = "range=32768,texels=2048", *higher = "range=450000,texels=28125";
+    for (const Case& t : {Case{two, DType::f32, low}, Case{strided, DType::f32, low}, Case{upsampled, DType::f32, low},
+                          Case{deep, DType::f16, higher}}) {
         size_t passes = 0, cut = 0;
         EXPECT_EQ(run_with_moments(t.c, t.dtype, "", passes), run_with_moments(t.c, t.dtype, t.limits, cut));
         EXPECT_GT(cut, passes);

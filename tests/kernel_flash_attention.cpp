@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "flash_attention.spv.h"
 #include "runtime/graph/cost_model.h"
-#include "tests/softmax_sum.h"
+#include "tests/support/softmax_sum.h"
 
 namespace semrover {
 namespace kernel_flash_attention_test {

@@ -1,11 +1,12 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/camera/lens.h"
 #include "engine/format/flow_picture.h"
 #include "engine/format/image.h"
 #include "engine/splat/rasterizer.h"
 #include "kernels/picture.h"
-#include "tests/kernel_case.h"
+#include "tests/support/kernel_case.h"
 
 namespace semrover {
 namespace kernel_flow_test {

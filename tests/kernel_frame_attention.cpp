@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/softmax_sum.h"
+// needs: device
+#include "tests/support/softmax_sum.h"
 
 namespace semrover {
 namespace kernel_frame_attention_test {

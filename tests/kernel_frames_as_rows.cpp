@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/feature_map_case.h"
+// needs: device
+#include "tests/support/feature_map_case.h"
 
 namespace semrover {
 namespace kernel_frames_as_rows_test {

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/kernel_case.h"
+// needs: device
+#include "tests/support/kernel_case.h"
 
 #include <cmath>
 

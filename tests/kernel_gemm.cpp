@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/kernel_case.h"
+// needs: device
+#include "tests/support/kernel_case.h"
 
 #include <cmath>
 #include <numbers>
@@ -9,15 +10,21 @@ namespace semrover {
 namespace kernel_gemm_test {
 
 struct GemmCase {
-    uint32_t rows, cols, depth, groups;
-    bool bias, gelu, gate;
+    uint32_t rows = 1, cols = 1, depth = 1, groups = 1;
+    bool bias = true, gelu = false, gate = false;
 };
 
 // one element; a row of one; aligned; odd tails everywhere; two groups; more than one tile of every variant
 const GemmCase kCases[] = {
-    {1, 1, 1, 1, false, false, false},    {1, 64, 8, 1, true, false, false},    {24, 64, 64, 1, true, false, false},
-    {25, 65, 9, 1, true, true, false},    {77, 41, 60, 1, true, false, true},   {50, 72, 48, 2, true, false, true},
-    {37, 120, 120, 2, true, true, false}, {131, 200, 264, 1, true, true, true}, {1090, 500, 24, 1, true, true, true},
+    {.rows = 1, .cols = 1, .depth = 1, .bias = false},
+    {.rows = 1, .cols = 64, .depth = 8},
+    {.rows = 24, .cols = 64, .depth = 64},
+    {.rows = 25, .cols = 65, .depth = 9, .gelu = true},
+    {.rows = 77, .cols = 41, .depth = 60, .gate = true},
+    {.rows = 50, .cols = 72, .depth = 48, .groups = 2, .gate = true},
+    {.rows = 37, .cols = 120, .depth = 120, .groups = 2, .gelu = true},
+    {.rows = 131, .cols = 200, .depth = 264, .gelu = true, .gate = true},
+    {.rows = 1090, .cols = 500, .depth = 24, .gelu = true, .gate = true},
 };
 
 double gelu_reference(double v)

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 // fp16 is stored rounded to nearest, ties to even, whatever the device's packHalf2x16 does
 #include "half_rounding.spv.h"
 #include "kernels/network.h"
-#include "tests/kernel_case.h"
+#include "tests/support/kernel_case.h"
 
 #include <cmath>
 #include <filesystem>

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "conv2d.spv.h"
 #include "gemm.spv.h"
 #include "kernels/network/matmul_tiles.h"
-#include "tests/feature_map_case.h"
+#include "tests/support/feature_map_case.h"
 
 namespace semrover {
 namespace kernel_matmul_tiles_test {

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/kernel_case.h"
+// needs: device
+#include "tests/support/kernel_case.h"
 
 #include <cmath>
-#include <numbers>
 
 namespace semrover {
 namespace kernel_modulate_test {
@@ -160,42 +160,6 @@ TEST(kernel_add, adds_in_either_precision_and_writes_where_it_is_told)
             }
         k.expect_zero_padding(got);
     });
-}
-
-double gelu_reference(double v)
-{
-    return 0.5 * v * (1 + std::tanh(std::sqrt(2 / std::numbers::pi) * (v + 0.044715 * v * v * v)));
-}
-double silu_reference(double v)
-{
-    return v / (1 + std::exp(-v));
-}
-
-void check_activation(Tensor (*op)(Graph&, Tensor), double (*reference)(double), const RowCase& c, DType dtype)
-{
-    KernelCase k(test_device());
-    HostMatrix x = k.random(c.rows, c.cols, dtype, 3);
-    x.set(0, 0, -65504); // the ends of fp16 and of the exponential
-    x.set(c.rows - 1, c.cols - 1, 65504);
-    x.set(0, c.cols / 2, 88.9f);
-    x.set(c.rows / 2, c.cols / 3, -88.9f);
-    const HostMatrix got = k.run(op(k.graph, k.input(x)));
-    for (uint32_t r = 0; r < c.rows; ++r)
-        for (uint32_t n = 0; n < c.cols; ++n) {
-            const double v = reference(x.at(r, n));
-            ASSERT_NEAR(got.at(r, n), v, 1e-6 * (1 + std::abs(v)) + half_error(dtype, v)) << "at " << x.at(r, n);
-        }
-    k.expect_zero_padding(got);
-}
-
-TEST(kernel_gelu, matches_its_formula_in_double)
-{
-    for_every_case([](const RowCase& c, DType dtype) { check_activation(gelu, gelu_reference, c, dtype); });
-}
-
-TEST(kernel_silu, matches_its_formula_in_double)
-{
-    for_every_case([](const RowCase& c, DType dtype) { check_activation(silu, silu_reference, c, dtype); });
 }
 
 } // namespace kernel_modulate_test

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/attention_sets.h"
+// needs: device
+#include "tests/support/attention_sets.h"
 
 namespace semrover {
 namespace kernel_neighbor_mask_test {

@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 // ops between pictures and networks: to the bit what the host does, which writes and reads the same pictures as files
 #include "kernels/picture.h"
 
 #include "engine/deferred/frame_codec.h"
 #include "engine/deferred/frame_images.h"
-#include "tests/frame_pixels_reference.h"
-#include "tests/kernel_case.h"
+#include "tests/support/frame_pixels_reference.h"
+#include "tests/support/kernel_case.h"
 
 #include <bit>
 #include <cmath>

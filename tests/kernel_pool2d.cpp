@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "kernels/recognition.h"
-#include "tests/feature_map_case.h"
+#include "tests/support/feature_map_case.h"
 
 #include <cmath>
 

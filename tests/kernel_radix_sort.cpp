@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "kernels/sort.h"
-#include "tests/kernel_case.h"
+#include "tests/support/kernel_case.h"
 
 #include <algorithm>
 #include <chrono>

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/splat_case.h"
+// needs: device
+#include "tests/support/splat_case.h"
 
 #include <numbers>
 

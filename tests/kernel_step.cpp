@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "kernels/sampling.h"
 #include "shaders/lib/step_row.h"
-#include "tests/kernel_case.h"
-#include "tests/philox_reference.h"
+#include "tests/support/kernel_case.h"
+#include "tests/support/philox_reference.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "engine/mesh/bvh.h"
 #include "kernels/mesh.h"
-#include "tests/clip_reference.h"
-#include "tests/kernel_case.h"
-#include "tests/philox_reference.h"
+#include "tests/support/clip_reference.h"
+#include "tests/support/kernel_case.h"
+#include "tests/support/philox_reference.h"
 
 #include <bit>
 #include <set>

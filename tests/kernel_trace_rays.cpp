@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "kernels/trace.h"
-#include "tests/splat_case.h"
+#include "tests/support/splat_case.h"
 #include "tools/streets/street.h"
 #include "tools/trace/trace_scene.h"
 

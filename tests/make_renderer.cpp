@@ -5,7 +5,7 @@
 #include "engine/model/checkpoint.h"
 #include "engine/model/ldm_config.h"
 #include "engine/model/renderer_model.h"
-#include "tests/json_text.h"
+#include "tests/support/json_text.h"
 #include "tools/dataset/model_writer.h"
 
 #include <CLI/CLI.hpp>

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: posix
 // the build tool that reads shaders refuses those that break runtime/graph/shader_interface.h
-#include "tests/program_result.h"
+#include "tests/support/program_result.h"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device posix
 #include "kernels/network.h"
 #include "runtime/device/device.h"
 #include "runtime/device/pipeline.h"
 #include "runtime/device/program.h"
-#include "tests/cache_home.h"
+#include "tests/support/cache_home.h"
 
 #include <gtest/gtest.h>
 #include <random>

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device
 #include "runtime/device/readback_ring.h"
 
 #include "kernels/sort.h"
-#include "tests/kernel_case.h"
+#include "tests/support/kernel_case.h"
 
 #include <numeric>
 

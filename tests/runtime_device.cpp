@@ -1,17 +1,19 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
+// needs: device posix
 #include "kernels/network.h"
 #include "runtime/device/device.h"
 #include "runtime/device/pipeline.h"
 #include "runtime/device/profile.h"
 #include "runtime/device/program.h"
 #include "runtime/device/state.h"
-#include "tests/cache_home.h"
-#include "tests/host_vulkan.h"
-#include "tests/json_text.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/cache_home.h"
+#include "tests/support/host_vulkan.h"
+#include "tests/support/json_text.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
+#include <algorithm>
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -269,9 +271,35 @@ TEST(runtime_device, writes_a_chrome_trace_of_every_pass)
         EXPECT_GE(event.at("ts").get<double>(), last);
         last = event.at("ts");
     }
-    EXPECT_EQ(trace.at("traceEvents")[1].at("name"), "gelu");
-    EXPECT_NE(profile->summary().find("gelu"), std::string::npos);
+    EXPECT_EQ(trace.at("traceEvents")[1].at("name"), "activation");
+    EXPECT_NE(profile->summary().find("activation"), std::string::npos);
     EXPECT_TRUE(says(profile->write(folder / "no" / "folder"), "cannot write the profile"));
+}
+
+// the lines that --profile prints of kernels; empty where the driver says nothing of its code
+std::string statistics_of_a_run(bool wanted)
+{
+    DeviceOptions options;
+    options.pipeline_statistics = wanted;
+    const auto device = make_device(options);
+    const auto profile = std::make_shared<Profile>();
+    device->set_profile(profile);
+    run_small_graph(*device);
+    return profile->statistics();
+}
+
+TEST(runtime_device, tells_what_its_driver_says_of_pipelines_only_where_that_is_wanted)
+{
+    const auto device = make_device();
+    const auto devices = list_devices();
+    ASSERT_TRUE(devices) << devices.error().message;
+    const auto& extensions = devices->at(device->index()).extensions;
+    const bool driver_does =
+        std::ranges::count(extensions, std::string(VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME)) > 0;
+    const std::string told = statistics_of_a_run(true);
+    EXPECT_EQ(told.find("activation") != std::string::npos, driver_does) << told;
+    EXPECT_EQ(told.find("Subgroup size") != std::string::npos, driver_does) << told;
+    EXPECT_EQ(statistics_of_a_run(false), "");
 }
 
 size_t reused_by_a_run()

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // what the reader must refuse, each with its own words; the list is that of the faults found in other readers
 #include "runtime/base/safetensors.h"
-#include "tests/safetensors_bytes.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/safetensors_bytes.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
 #include <chrono>
 #include <gtest/gtest.h>

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/safetensors_bytes.h"
-#include "tests/says.h"
-#include "tests/scratch_folder.h"
+#include "tests/support/safetensors_bytes.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch_folder.h"
 
 #include "runtime/base/safetensors.h"
 

@@ -9,6 +9,7 @@
 #include "runtime/device/device_fault.h"
 #include "runtime/device/physical_device.h"
 #include "runtime/device/pipeline.h"
+#include "runtime/device/pipeline_statistics.h"
 #include "runtime/device/profile.h"
 #include "runtime/device/sharing.h"
 #include "runtime/device/staging.h"
@@ -185,6 +186,14 @@ Status Device::create_device(const DeviceOptions& options, bool matrices)
         faults.pNext = std::exchange(features.pNext, &faults);
         extensions.push_back(VK_EXT_DEVICE_FAULT_EXTENSION_NAME);
     }
+    auto statistics = vk_struct<VkPhysicalDevicePipelineExecutablePropertiesFeaturesKHR>(
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PIPELINE_EXECUTABLE_PROPERTIES_FEATURES_KHR);
+    pipeline_statistics_ = options.pipeline_statistics && has_pipeline_statistics(vk_, physical_);
+    if (pipeline_statistics_) {
+        statistics.pipelineExecutableInfo = VK_TRUE;
+        statistics.pNext = std::exchange(features.pNext, &statistics);
+        extensions.push_back(VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME);
+    }
     MatrixFeatures matrix;
     if (matrices) {
         f12.vulkanMemoryModel = VK_TRUE;
@@ -260,6 +269,7 @@ Result<std::unique_ptr<Device>> Device::beside(Device& first)
     d->index_ = first.index_;
     d->sharing_ = first.sharing_;
     d->pipeline_robustness_ = first.pipeline_robustness_;
+    d->pipeline_statistics_ = first.pipeline_statistics_;
     d->memory_source_ = first.memory_source_;
     d->cancelled_ = first.cancelled_;
     d->limits_ = first.limits_;

@@ -37,6 +37,7 @@ struct DeviceOptions {
     // for every Vulkan object, read while the device is made; null: the driver's own
     const VkAllocationCallbacks* allocation = nullptr;
     bool autotune = true;     // programs try alternatives in their first runs, where a device has a watchdog
+    bool pipeline_statistics = false; // pipelines keep what the driver says of their code, where it does, for a Profile
     bool share_by_fd = false; // enables what Sharing needs, where there is it; an application's device says what it has
 };
 
@@ -120,6 +121,7 @@ class Device {
     const VulkanCalls& vk() const { return vk_; }
     bool owned() const { return owned_; }                             // not an application's
     bool pipeline_robustness() const { return pipeline_robustness_; } // pipelines ask for it, and the device does not
+    bool pipeline_statistics() const { return pipeline_statistics_; } // pipelines capture them
     VkInstance instance() const { return instance_; }
     VkPhysicalDevice physical() const { return physical_; }
     uint32_t queue_family() const { return queue_.family; }
@@ -200,6 +202,7 @@ class Device {
     uint32_t index_ = 0;
     bool owned_ = true;
     bool pipeline_robustness_ = false;
+    bool pipeline_statistics_ = false;
     Sharing sharing_;
     MemorySource memory_source_;
     std::function<bool()> cancelled_;

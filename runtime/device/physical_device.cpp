@@ -16,7 +16,7 @@ namespace {
 // reported by `devices`; used where a kernel variant asks for them
 constexpr const char* kOptionalExtensions[] = {"VK_KHR_cooperative_matrix", "VK_NV_cooperative_matrix2",
                                                "VK_EXT_subgroup_size_control", "VK_EXT_memory_budget",
-                                               "VK_EXT_device_fault"};
+                                               "VK_EXT_device_fault", "VK_KHR_pipeline_executable_properties"};
 
 DeviceType device_type(VkPhysicalDeviceType type)
 {

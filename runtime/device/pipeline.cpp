@@ -6,6 +6,7 @@
 #include "runtime/base/hash.h"
 #include "runtime/device/debug_names.h"
 #include "runtime/device/device.h"
+#include "runtime/device/pipeline_statistics.h"
 #include "runtime/system/system.h"
 
 #include <algorithm>
@@ -204,14 +205,19 @@ Status PipelineStore::compile(std::span<Missing> missing)
             });
     } catch (const std::system_error&) { // no more threads: those that are there do it
     }
-    Status status = device_.check_cancelled();
-    for (auto begin = std::chrono::steady_clock::now(); status && make_next(); status = device_.check_cancelled()) {
+    auto begin = std::chrono::steady_clock::now();
+    const auto save = [&] {
         const auto now = std::chrono::steady_clock::now();
         save_by_and_by(std::chrono::duration<double>(now - begin).count());
         begin = now;
-    }
+    };
+    Status status = device_.check_cancelled();
+    for (; status && make_next(); status = device_.check_cancelled())
+        save();
     next = missing.size();
     others.clear();
+    if (!missing.empty()) // what the other threads made last, or all of it
+        save();
     for (Missing& m : missing)
         if (m.made.pipeline)
             pipelines_[{m.pass->variant, m.pass->constants}] = m.made;
@@ -302,15 +308,21 @@ Status PipelineStore::make(Missing& m) const
         &specialization};
     info.layout = m.shader->layout;
     info.flags = VK_PIPELINE_CREATE_DISPATCH_BASE_BIT; // long passes are cut
+    if (device_.pipeline_statistics())
+        info.flags |= VK_PIPELINE_CREATE_CAPTURE_STATISTICS_BIT_KHR;
     auto robust = vk_struct<VkPipelineRobustnessCreateInfoEXT>(VK_STRUCTURE_TYPE_PIPELINE_ROBUSTNESS_CREATE_INFO_EXT);
     robust.storageBuffers = robust.uniformBuffers = VK_PIPELINE_ROBUSTNESS_BUFFER_BEHAVIOR_ROBUST_BUFFER_ACCESS_EXT;
     if (device_.pipeline_robustness())
         info.pNext = &robust;
-    m.made = {VK_NULL_HANDLE, m.shader->layout, m.shader->set_layout};
+    m.made = {VK_NULL_HANDLE, m.shader->layout, m.shader->set_layout, nullptr};
     SR_VK(device_.vk().CreateComputePipelines(device_.handle(), cache_, 1, &info, device_.vk().allocator(),
                                               &m.made.pipeline));
     name_object(device_.vk(), device_.handle(), VK_OBJECT_TYPE_PIPELINE, reinterpret_cast<uint64_t>(m.made.pipeline),
                 m.pass->name());
+    if (device_.pipeline_statistics()) {
+        SR_TRY(auto statistics, statistics_of(device_.vk(), device_.handle(), m.made.pipeline));
+        m.made.statistics = std::make_shared<const std::vector<Statistic>>(std::move(statistics));
+    }
     return {};
 }
 

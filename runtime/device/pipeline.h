@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "runtime/device/profile.h"
 #include "runtime/device/vulkan.h"
 #include "runtime/graph/pass.h"
 
@@ -26,6 +27,7 @@ struct Pipeline {
     VkPipeline pipeline = VK_NULL_HANDLE;
     VkPipelineLayout layout = VK_NULL_HANDLE; // its shader's
     VkDescriptorSetLayout set_layout = VK_NULL_HANDLE;
+    std::shared_ptr<const std::vector<Statistic>> statistics; // null where the device does not capture them
 };
 
 // Compute pipelines by (variant, constants), made when a program needs them, over a VkPipelineCache kept on disk in

@@ -321,7 +321,8 @@ Status Program::collect_profile()
                                 end - begin,
                                 std::to_array(d.count),
                                 pass.options.flops * part,
-                                {pass.grid.tile.rows, pass.grid.tile.cols}});
+                                {pass.grid.tile.rows, pass.grid.tile.cols},
+                                pipelines_[d.pass]->statistics});
     }
     return {};
 }

@@ -77,6 +77,8 @@
     X(CmdBeginDebugUtilsLabelEXT)                                                                                      \
     X(CmdEndDebugUtilsLabelEXT)                                                                                        \
     X(GetMemoryFdKHR)                                                                                                  \
+    X(GetPipelineExecutablePropertiesKHR)                                                                              \
+    X(GetPipelineExecutableStatisticsKHR)                                                                              \
     X(GetSemaphoreFdKHR)                                                                                               \
     X(SetDebugUtilsObjectNameEXT)
 

@@ -47,6 +47,15 @@ uint64_t Plan::transient_bytes() const
     return sum;
 }
 
+uint32_t Plan::barriers() const
+{
+    uint32_t count = submits;
+    for (size_t i = 1; i < dispatches.size(); ++i)
+        count += dispatches[i].submit == dispatches[i - 1].submit &&
+                 passes[dispatches[i].pass].level != passes[dispatches[i - 1].pass].level;
+    return count;
+}
+
 bool overlaps(const Plan& plan, const PassBinding& a, const PassBinding& b)
 {
     if (!a.given() || !b.given())

@@ -38,7 +38,7 @@ struct Plan {
 
     uint64_t arena_bytes() const;
     uint64_t transient_bytes() const; // what it would be without aliasing
-    uint32_t barriers() const { return levels; }
+    uint32_t barriers() const; // of one run: between levels, and at the end of each submit
 };
 
 class CostModel;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/golden_tensors.h"
+#include "tests/support/golden_tensors.h"
 
 #include <fstream>
 #include <iterator>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/json_text.h"
+#include "tests/support/json_text.h"
 
 #include <ostream>
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/kernel_case.h"
+#include "tests/support/kernel_case.h"
 
 namespace semrover {
 

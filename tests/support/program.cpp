@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/program.h"
+#include "tests/support/program.h"
 
 #include <algorithm>
 #include <cstdlib>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/scratch_folder.h"
+#include "tests/support/scratch_folder.h"
 
 #include <fstream>
 #include <iterator>

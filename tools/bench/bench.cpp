@@ -51,8 +51,10 @@ Json bench_report(const char* kind, const Device& device, DType precision, const
 
 void add_program(Json& report, const Program& program)
 {
-    report["dispatches"] = program.plan().passes.size();
-    report["barriers"] = program.plan().barriers();
+    const Plan& plan = program.plan();
+    report["dispatches"] = plan.dispatches.size();
+    report["barriers"] = plan.barriers();
+    report["submits"] = plan.submits;
     report["host_us_per_step"] = program.host_us();
 }
 
@@ -82,7 +84,9 @@ void add_network(Json& report, const Program& program, const Timing& timing, uin
 
 void add_profile(CLI::App& command, std::string& path)
 {
-    command.add_option("--profile", path, "write device times as a Chrome trace, and their sums to stderr");
+    command.add_option("--profile", path,
+                       "write device times as a Chrome trace; their sums, and what the driver says of each kernel's code, "
+                       "to stderr");
 }
 
 void add_weights(CLI::App& command, std::string& weights)
@@ -103,10 +107,10 @@ Status store_as(const std::string& weights, UnetConfig& config)
 
 void add_plan(CLI::App& command, bool& plan)
 {
-    command.add_flag("--plan", plan, "write to stderr what is done, in which order: passes, barriers, submits");
+    command.add_flag("--plan", plan, "write to stderr what a run does, in which order: passes, barriers, submits");
 }
 
-void want_profile(Device& device, const std::string& path)
+void restart_profile(Device& device, const std::string& path)
 {
     if (!path.empty())
         device.set_profile(std::make_shared<Profile>());
@@ -116,7 +120,7 @@ Status write_profile(Device& device, const std::string& path)
 {
     if (!device.profile())
         return {};
-    print_stderr("{}", device.profile()->summary());
+    print_stderr("{}{}", device.profile()->summary(), device.profile()->statistics());
     return device.profile()->write(path);
 }
 

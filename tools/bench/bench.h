@@ -30,7 +30,7 @@ Result<Timing> measure(const std::function<Status()>& work);
 // the fields that every benchmark's JSON has
 Json bench_report(const char* kind, const Device& device, DType precision, const Timing& timing,
                   uint64_t predicted_bytes);
-void add_program(Json& report, const Program& program);          // dispatches, barriers, host_us_per_step
+void add_program(Json& report, const Program& program);          // dispatches, barriers, submits of a run; host_us_per_step
 void add_rate(Json& report, double flops, const Timing& timing); // gflop, gflops, gflops_best
 // the same of a network's evaluation, and gflop (what is computed: Winograd's algorithm counts as little as it does),
 // gflops, weight_bytes
@@ -54,10 +54,10 @@ void add_weights(CLI::App& command, std::string& weights);
 // a UNet's config with such weights, where they are given. bad_input: one that cannot have them
 Status store_as(const std::string& weights, UnetConfig& config);
 
-// device times where --profile asked for them: a Chrome trace, and their sums to stderr
+// --profile: device times as a Chrome trace; their sums, and what the driver says of each kernel's code, to stderr
 void add_profile(CLI::App& command, std::string& path);
 void add_plan(CLI::App& command, bool& plan);
-void want_profile(Device& device, const std::string& path);
+void restart_profile(Device& device, const std::string& path); // without what ran before, such as loading weights
 Status write_profile(Device& device, const std::string& path);
 void print_report(const Json& report, const Globals& globals);
 

@@ -38,9 +38,9 @@ Status bench_conv(const BenchConvArguments& o, const Globals& globals)
     (void)(o.winograd ? winograd_conv2d(g, map, winograd_weight(g, weight), {}, options)
                       : conv2d(g, map, {}, weight, {}, options));
     SR_TRY(const auto program, Program::create(*device, g));
+    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     if (o.plan)
         print_stderr("{}", plan_text(program->plan()));
-    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     Json report = bench_report("conv", *device, dtype, timing, inputs.bytes() + program->plan().arena_bytes());
     report["width"] = o.width;
     report["height"] = o.height;

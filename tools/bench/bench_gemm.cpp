@@ -30,9 +30,9 @@ Status bench_gemm(const BenchGemmArguments& o, const Globals& globals)
                     block_of(w_dtype).elements);
     BenchInputs inputs(*device);
     SR_TRY(const auto program, gemm_program(*device, inputs, o.shape, dtype, w_dtype));
+    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     if (o.plan)
         print_stderr("{}", plan_text(program->plan()));
-    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     Json report = bench_report("gemm", *device, dtype, timing, inputs.bytes() + program->plan().arena_bytes());
     report["m"] = o.shape.m;
     report["n"] = o.shape.n;

@@ -26,7 +26,7 @@ Status bench_unet(const BenchUnetArguments& o, const Globals& globals)
     config.in_channels = 13;
     SR_CHECK(read_config(o.config, parse_unet_config, config));
     SR_CHECK(store_as(o.weights, config));
-    SR_TRY(const auto device, open_device(globals));
+    SR_TRY(const auto device, open_device(globals, o.profile));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     SR_TRY(const auto unet, Unet::load(*device, config, Checkpoint::random(1), dtype));
     FeatureMap x{{}, o.batch, o.height, o.width};
@@ -41,11 +41,11 @@ Status bench_unet(const BenchUnetArguments& o, const Globals& globals)
     const Tensor table_row = row.in(g);
     SR_CHECK(row.clear(*device));
     (void)unet->forward(g, x, table.in(g), table_row, {text.in(g), o.tokens, 0});
-    want_profile(*device, o.profile);
+    restart_profile(*device, o.profile);
     SR_TRY(const auto program, Program::create(*device, g));
+    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     if (o.plan)
         print_stderr("{}", plan_text(program->plan()));
-    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     const uint64_t predicted = unet->device_bytes(device->limits()) + inputs.bytes() + program->plan().arena_bytes();
     Json report = bench_report("unet", *device, dtype, timing, predicted);
     report["width"] = o.width;

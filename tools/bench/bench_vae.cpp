@@ -25,7 +25,7 @@ Status bench_vae(const BenchVaeArguments& o, const Globals& globals)
 {
     VaeConfig config; // Stable Diffusion 1.5's
     SR_CHECK(read_config(o.config, parse_vae_config, config));
-    SR_TRY(const auto device, open_device(globals));
+    SR_TRY(const auto device, open_device(globals, o.profile));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     SR_TRY(const auto vae, Vae::load(*device, config, Checkpoint::random(1), dtype));
     const uint32_t scale = o.encode ? 1 : config.downscale();
@@ -36,11 +36,11 @@ Status bench_vae(const BenchVaeArguments& o, const Globals& globals)
     Graph g(device->limits());
     x.data = in.in(g);
     (void)(o.encode ? vae->encode(g, x) : vae->decode(g, x));
-    want_profile(*device, o.profile);
+    restart_profile(*device, o.profile);
     SR_TRY(const auto program, Program::create(*device, g));
+    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     if (o.plan)
         print_stderr("{}", plan_text(program->plan()));
-    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
     const uint64_t weights = vae->device_bytes(device->limits());
     Json report = bench_report("vae", *device, dtype, timing, weights + inputs.bytes() + program->plan().arena_bytes());
     report["direction"] = o.encode ? "encode" : "decode";

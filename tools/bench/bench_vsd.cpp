@@ -117,7 +117,7 @@ Result<Timing> time_window(VsdRenderer& vsd, const LatentSize& size, uint32_t ch
 Status bench_vsd(const BenchVsdArguments& o, const Globals& globals)
 {
     SR_TRY(const VideoNetworks n, read_video_networks(o));
-    SR_TRY(const auto device, open_device(globals));
+    SR_TRY(const auto device, open_device(globals, o.profile));
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     SR_TRY(const double gemm, gemm_rate(*device, dtype));
     device->reset_peak();
@@ -137,7 +137,7 @@ Status bench_vsd(const BenchVsdArguments& o, const Globals& globals)
            VsdRenderer::create(*device, *unet, plan, {o.tokens, text, added}, size, o.frames, options, arena));
     SR_TRY(const auto encoder, FrameEncoder::create(*device, *vae, size, true, arena));
     SR_TRY(const auto decoder, FrameDecoder::create(*device, *vae, size, o.decode_frames, arena));
-    want_profile(*device, o.profile);
+    restart_profile(*device, o.profile);
     SR_TRY(const Timing encode, time_encoder(*encoder, *vae, size, o.evaluations));
     SR_TRY(const Timing decode, time_decoder(*decoder, *vae, size, o.decode_frames, o.evaluations));
     SR_TRY(const Timing step, time_window(*vsd, size, n.unet.out_channels, o.evaluations));

@@ -48,8 +48,8 @@ std::string plan_text(const Plan& plan)
                 text += fmt::format(" {}", plan.resources[b.resource].name);
         text += '\n';
     }
-    return text + fmt::format("{} passes, {} taken over by others, {} barriers, {} submits, {:.1f} MiB of arena\n",
-                              plan.passes.size(), plan.fused, plan.barriers(), plan.submits,
+    return text + fmt::format("{} passes, {} taken over by others, {} dispatches, {} barriers, {} submits, {:.1f} MiB of arena\n",
+                              plan.passes.size(), plan.fused, plan.dispatches.size(), plan.barriers(), plan.submits,
                               double(plan.arena_bytes()) / (1 << 20));
 }
 

@@ -22,6 +22,7 @@ Result<std::shared_ptr<Device>> open_device(const Globals& globals, const std::s
     options.max_bytes = globals.max_vram;
     options.autotune = globals.autotune;
     options.cancelled = interrupt_requested;
+    options.pipeline_statistics = !profile.empty();
     SR_TRY(std::shared_ptr<Device> device, Device::create(options));
     if (globals.session)
         globals.session->device = device;
@@ -36,7 +37,7 @@ Status write_profile(Device& device, const std::string& path, const Globals& glo
         return {};
     SR_CHECK(device.profile()->write(path));
     if (globals.verbose)
-        print_stderr("{}", device.profile()->summary());
+        print_stderr("{}{}", device.profile()->summary(), device.profile()->statistics());
     return {};
 }
 
