@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // needs: programs
-#include "kernels/catalogue.h"
+#include "kernels/kernel_registry.h"
 #include "tests/support/json_text.h"
 #include "tests/support/program.h"
 
@@ -24,7 +24,7 @@ TEST(Catalogue, has_every_op_of_the_shaders_once)
             ops.insert(file.substr(0, file.find('.')));
     }
     std::set<std::string> found;
-    for (const Kernel* kernel : kernel_catalogue())
+    for (const Kernel* kernel : kernel_registry())
         EXPECT_TRUE(found.emplace(kernel->name).second) << kernel->name;
     EXPECT_EQ(found, ops);
 }

@@ -89,12 +89,12 @@ struct Memory : FrameStore {
     std::map<std::string, std::vector<Picture>> frames;
     std::map<uint32_t, std::vector<float>> latents; // to go on from
 
-    Status read_seen(const CameraChain&, uint32_t frame, const Slot& to) override
+    Status read_seen(const CameraChain&, uint32_t frame, const DeviceTensor& to) override
     {
         return to.write(device(), seen(frame));
     }
     Result<FrameView> view(const CameraChain&, uint32_t) override { return FrameView{}; }
-    Status save_frame(const CameraChain& chain, uint32_t, const Slot& pixels) override
+    Status save_frame(const CameraChain& chain, uint32_t, const DeviceTensor& pixels) override
     {
         Picture& picture = frames[chain.name].emplace_back(*pixels.read<uint8_t>(device()));
         picture.resize(kPixels * 3);

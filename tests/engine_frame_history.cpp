@@ -97,8 +97,8 @@ TEST(engine_frame_history, goes_on_from_a_restored_frame_to_the_same_bytes)
 TEST(engine_frame_history, takes_words_on_the_device_like_pixels_of_the_host)
 {
     const auto host = begin(), device = begin();
-    State state;
-    const Slot words = state.slot(kBytes / 4, 1, DType::u32, "decoded", 1);
+    TensorPool state;
+    const DeviceTensor words = state.tensor(kBytes / 4, 1, DType::u32, "decoded", 1);
     ASSERT_TRUE(state.allocate(test_device(), "test"));
     for (uint32_t f = 0; f < 3; ++f) {
         ASSERT_TRUE(host->add(pixels(f), camera(f), depth(f)));

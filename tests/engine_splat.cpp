@@ -473,7 +473,7 @@ TEST(engine_splat, a_picture_costs_by_the_splats_that_are_there)
         const SplatCamera seen_by = camera_above();
         images[large] = *rasterizer->render({&seen_by, 1});
         bytes[large][1] = rasterizer->planned_bytes();
-        for (const Pass& pass : rasterizer->program().plan().passes)
+        for (const Pass& pass : rasterizer->executable().plan().passes)
             workgroups[large] += uint64_t(pass.group_count[0]) * pass.group_count[1] * pass.group_count[2];
     }
     EXPECT_EQ(bytes[0][0], bytes[1][0]);

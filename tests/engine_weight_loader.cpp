@@ -57,7 +57,7 @@ uint32_t place_of(const IndexRanges& runs, uint32_t from)
 // what the comment of WeightPart says, element by element
 std::vector<float> expected(const WeightLayout& w, const File& file)
 {
-    const Slot& slot = w.weight;
+    const DeviceTensor& slot = w.weight;
     std::vector<float> all(size_t(slot.rows()) * slot.ld());
     for (const WeightPart& p : w.parts) {
         const uint32_t rows = uint32_t(p.rows.back().from + p.rows.back().count);
@@ -93,14 +93,14 @@ WeightPart conv_part(const std::string& name, uint32_t outputs, uint32_t first, 
 }
 
 struct Network {
-    State state;
+    TensorPool state;
     std::vector<WeightLayout> weights;
     File file;
 
     explicit Network(DType in_file, DType on_device) : file(in_file)
     {
         const auto add = [&](uint32_t rows, uint32_t cols, std::vector<WeightPart> parts) {
-            weights.push_back({state.slot(rows, cols, on_device, "weight"), std::move(parts)});
+            weights.push_back({state.tensor(rows, cols, on_device, "weight"), std::move(parts)});
         };
         add(37, 64, {{{"as it lies", {37, 64}}, 64, straight(37), straight(64)}});
         add(37, 61, {{{"padded", {37, 61}}, 61, straight(37), straight(61)}});
@@ -212,14 +212,14 @@ class BlockFile {
 };
 
 struct BlockNetwork {
-    State state;
+    TensorPool state;
     std::vector<WeightLayout> weights;
     BlockFile file;
 
     explicit BlockNetwork(DType in_file) : file(in_file)
     {
         const auto add = [&](uint32_t rows, uint32_t cols, std::vector<WeightPart> parts) {
-            weights.push_back({state.slot(rows, cols, DType::q8_0, "weight"), std::move(parts)});
+            weights.push_back({state.tensor(rows, cols, DType::q8_0, "weight"), std::move(parts)});
         };
         add(37, 64, {{{"as it lies", {37, 64}}, 64, straight(37), straight(64)}});
         add(5, 9 * 32, {conv_part("taps", 5, 32, 0, 1)});
@@ -248,7 +248,7 @@ struct BlockNetwork {
 };
 
 // an element of a weight on the device: int8 of a row, then its scales
-float element_of(const Slot& weight, const std::vector<std::byte>& bytes, uint32_t row, uint32_t col)
+float element_of(const DeviceTensor& weight, const std::vector<std::byte>& bytes, uint32_t row, uint32_t col)
 {
     const size_t row_bytes = (weight.ld() + weight.ld() / 16 + 15) / 16 * 16, at = row * row_bytes;
     uint16_t scale = 0;
@@ -308,8 +308,8 @@ TEST(engine_weight_loader, loads_what_is_larger_than_its_window)
 {
     auto device = Device::create({.limits = "staging=1"});
     ASSERT_TRUE(device) << device.error().message;
-    State state;
-    const std::vector<WeightLayout> weights{{state.slot(3000, 2048, DType::f32, "large"),
+    TensorPool state;
+    const std::vector<WeightLayout> weights{{state.tensor(3000, 2048, DType::f32, "large"),
                                              {{{"large", {3000, 2048}}, 2048, straight(3000), straight(2048)}}}};
     ASSERT_TRUE(state.allocate(**device, "weights"));
     File file(DType::f32);

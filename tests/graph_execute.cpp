@@ -80,10 +80,10 @@ Plan random_plan(ExternalMemory& memory, uint32_t seed, const DeviceLimits& limi
 Bytes run(ExternalMemory& memory, Plan plan, int times = 1)
 {
     memory.fill();
-    auto program = Program::create(test_device(), std::move(plan));
-    EXPECT_TRUE(program) << program.error().message;
-    for (int i = 0; program && i < times; ++i) {
-        const Status status = (*program)->run();
+    auto executable = Executable::create(test_device(), std::move(plan));
+    EXPECT_TRUE(executable) << executable.error().message;
+    for (int i = 0; executable && i < times; ++i) {
+        const Status status = (*executable)->run();
         EXPECT_TRUE(status) << status.error().message;
     }
     return memory.contents();
@@ -178,11 +178,11 @@ TEST(graph_execute, replays_a_program_with_the_same_bytes)
         t = add(g, gelu(g, gemm(g, t, w, {}, {.dtype = DType::f32})), t);
     add(g, t, t, {out});
     memory.fill();
-    auto program = Program::create(test_device(), g);
-    ASSERT_TRUE(program) << program.error().message;
+    auto executable = Executable::create(test_device(), g);
+    ASSERT_TRUE(executable) << executable.error().message;
     Bytes first;
     for (int i = 0; i < 20; ++i) {
-        ASSERT_TRUE((*program)->run());
+        ASSERT_TRUE((*executable)->run());
         const Bytes now = memory.contents();
         if (first.empty())
             first = now;
@@ -209,20 +209,20 @@ TEST(graph_execute, cuts_submits_anew_after_the_first_run)
     for (int i = 0; i < 4; ++i)
         t = gemm(g, t, w, {}, {.dtype = DType::f32}); // 0.07 ms each, as estimated
     g.keep(t, g.external((*y)->slice(), 256, 256, DType::f32, "y"));
-    auto program = Program::create(**device, g);
-    ASSERT_TRUE(program) << program.error().message;
-    EXPECT_EQ((*program)->plan().submits, 1u);
+    auto executable = Executable::create(**device, g);
+    ASSERT_TRUE(executable) << executable.error().message;
+    EXPECT_EQ((*executable)->plan().submits, 1u);
     std::vector<float> first(numbers.size()), now(numbers.size());
-    ASSERT_TRUE((*program)->run());
+    ASSERT_TRUE((*executable)->run());
     ASSERT_TRUE((*device)->read((*y)->slice(), std::as_writable_bytes(std::span(first))));
     for (int i = 0; i < 3; ++i) {
-        ASSERT_TRUE((*program)->run());
+        ASSERT_TRUE((*executable)->run());
         ASSERT_TRUE((*device)->read((*y)->slice(), std::as_writable_bytes(std::span(now))));
         EXPECT_TRUE(first == now) << i;
     }
     if ((*device)->limits().type == DeviceType::cpu) { // far slower than that
-        EXPECT_GT((*program)->plan().submits, 1u);
-        auto next = Program::create(**device, g);
+        EXPECT_GT((*executable)->plan().submits, 1u);
+        auto next = Executable::create(**device, g);
         ASSERT_TRUE(next) << next.error().message;
         EXPECT_GT((*next)->plan().submits, 1u); // it has learned
     }
@@ -236,10 +236,10 @@ TEST(graph_execute, keeps_runs_in_order_that_nobody_waits_for)
     add(g, sum, x, {sum}); // each run reads what the last one wrote
     memory.fill();
     const Plan plan = plan_of(g);
-    auto program = Program::create(test_device(), plan);
-    ASSERT_TRUE(program) << program.error().message;
+    auto executable = Executable::create(test_device(), plan);
+    ASSERT_TRUE(executable) << executable.error().message;
     for (int i = 0; i < 50; ++i)
-        ASSERT_TRUE((*program)->submit());
+        ASSERT_TRUE((*executable)->submit());
     ASSERT_TRUE(test_device().wait(test_device().last_ticket()));
     const Bytes queued = memory.contents();
     EXPECT_TRUE(queued == run(memory, plan, 50));
@@ -252,10 +252,10 @@ TEST(graph_execute, uses_exactly_the_memory_that_the_plan_predicts)
         const Plan plan = random_plan(memory, seed, test_device().limits());
         const uint64_t before = test_device().allocated_bytes();
         test_device().reset_peak();
-        auto program = Program::create(test_device(), plan);
-        ASSERT_TRUE(program) << program.error().message;
+        auto executable = Executable::create(test_device(), plan);
+        ASSERT_TRUE(executable) << executable.error().message;
         EXPECT_EQ(test_device().peak_bytes() - before, plan.arena_bytes());
-        program->reset();
+        executable->reset();
         EXPECT_EQ(test_device().allocated_bytes(), before);
     }
 }

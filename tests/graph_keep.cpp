@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/device/state.h"
+#include "runtime/device/tensor_pool.h"
 #include "tests/support/graph_memory.h"
 
 #include <gtest/gtest.h>
@@ -10,8 +10,8 @@ namespace graph_keep_test {
 
 // of slots and graphs without a device: what is planned, and what is refused
 struct KeepCase {
-    State state;
-    Slot x = state.slot(16, 64, DType::f32, "x"), y = state.slot(16, 64, DType::f32, "y");
+    TensorPool state;
+    DeviceTensor x = state.tensor(16, 64, DType::f32, "x"), y = state.tensor(16, 64, DType::f32, "y");
     Graph g{test_limits()};
 
     std::string levels() const { return levels_text(*make_plan(g)); }
@@ -27,30 +27,31 @@ TEST(graph_keep, a_slot_is_one_resource_of_a_graph_however_often_it_is_asked_for
     EXPECT_EQ(part.offset, 4u * 64 * 4);
     EXPECT_EQ(part.rows, 8u);
     EXPECT_EQ(c.g.resources().size(), 2u);
-    EXPECT_FALSE(Slot().in(c.g).valid());
+    EXPECT_FALSE(DeviceTensor().in(c.g).valid());
 }
 
 TEST(graph_keep, a_slot_says_its_shape)
 {
-    State state;
-    const Slot words = state.slot(10, 1, DType::u32, "words", 1), rows = state.slot(3, 5, DType::f16, "rows");
+    TensorPool state;
+    const DeviceTensor words = state.tensor(10, 1, DType::u32, "words", 1),
+                       rows = state.tensor(3, 5, DType::f16, "rows");
     EXPECT_EQ(words.bytes(), 40u);
     EXPECT_EQ(rows.ld(), 8u);
     EXPECT_EQ(rows.bytes(), 3u * 8 * 2);
     EXPECT_EQ(rows.name(), "rows");
     EXPECT_DEATH((void)words.row_range(8, 3), "rows 8 to 11 of 'words', which has 10");
-    EXPECT_DEATH((void)state.slot(0, 4, DType::f32, "none"), "slot 'none' is \\[0, 4\\]");
+    EXPECT_DEATH((void)state.tensor(0, 4, DType::f32, "none"), "slot 'none' is \\[0, 4\\]");
 }
 
 TEST(graph_keep, planned_bytes_are_those_of_the_slots_in_blocks_a_device_can_allocate)
 {
-    State state;
-    (void)state.slot(1, 1, DType::u32, "one", 1);
-    (void)state.slot(300, 1, DType::u32, "more", 1);
+    TensorPool state;
+    (void)state.tensor(1, 1, DType::u32, "one", 1);
+    (void)state.tensor(300, 1, DType::u32, "more", 1);
     DeviceLimits limits = test_limits();
     limits.offset_alignment = 256;
     EXPECT_EQ(state.planned_bytes(limits), 256u + 1280);
-    State moved = std::move(state);
+    TensorPool moved = std::move(state);
     EXPECT_EQ(moved.planned_bytes(limits), 256u + 1280);
 }
 
@@ -80,8 +81,8 @@ TEST(graph_keep, what_reads_the_slot_before_is_ordered_before_what_is_kept_there
 
 TEST(graph_keep, a_part_of_a_slot_is_kept_beside_what_another_part_holds)
 {
-    State state;
-    const Slot both = state.slot(32, 64, DType::f32, "both"), x = state.slot(16, 64, DType::f32, "x");
+    TensorPool state;
+    const DeviceTensor both = state.tensor(32, 64, DType::f32, "both"), x = state.tensor(16, 64, DType::f32, "x");
     Graph g{test_limits()};
     const Tensor lower = silu(g, x.in(g)), upper = gelu(g, both.row_range(0, 16).in(g));
     g.keep(lower, both.row_range(16, 16));
@@ -120,8 +121,9 @@ TEST(graph_keep, refuses_a_slot_whose_old_contents_are_still_read)
 TEST(graph_keep, refuses_what_does_not_fit_and_says_both)
 {
     KeepCase c;
-    const Slot narrow = c.state.slot(16, 60, DType::f32, "narrow"), half = c.state.slot(16, 64, DType::f16, "half"),
-               wide = c.state.slot(16, 64, DType::f32, "wide", 72);
+    const DeviceTensor narrow = c.state.tensor(16, 60, DType::f32, "narrow"),
+                       half = c.state.tensor(16, 64, DType::f16, "half"),
+                       wide = c.state.tensor(16, 64, DType::f32, "wide", 72);
     const Tensor made = gelu(c.g, c.x.in(c.g));
     EXPECT_DEATH(c.g.keep(made, narrow),
                  "'gelu', \\[16, 64\\] F32 with rows 64 apart, is kept in 'narrow', \\[16, 60\\]");

@@ -170,7 +170,7 @@ TEST(graph_schedule, learns_how_long_a_shader_takes)
     for (int i = 0; i < 1000; ++i)
         rates.learn(pass, std::max(estimated / 1000, 1.1e-4));
     EXPECT_NEAR(rates.seconds(pass), estimated / 64, 1e-4 * estimated / 64); // not believed
-    pass.options.most_operations = pass.options.flops;
+    pass.options.max_flops = pass.options.flops;
     EXPECT_EQ(rates.seconds(pass), estimated); // the next data may have all that there can be
     for (int i = 0; i < 100000; ++i)
         rates.learn(pass, estimated * 4);

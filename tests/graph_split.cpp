@@ -12,7 +12,7 @@ constexpr uint32_t kChannels = 1280;
 DeviceLimits matrix_limits()
 {
     DeviceLimits limits = test_limits();
-    limits.needs_supported = kNeedsFloat16 | kNeedsCooperativeMatrix | kNeedsSubgroupVote;
+    limits.features = kFeatureFloat16 | kFeatureCooperativeMatrix | kFeatureSubgroupVote;
     limits.matrix = {16, 16, 16, 32, false};
     limits.max_shared_bytes = 48 << 10;
     limits.max_group_threads = 1024;

@@ -188,9 +188,9 @@ TEST(kernel_flash_attention, gives_the_same_bits_in_parts)
     ASSERT_TRUE(plan) << plan.error().message;
     stage::submits(*plan, limits, CostModel().seconds(*plan));
     EXPECT_GT(plan->submits, 1u);
-    auto program = Program::create(test_device(), std::move(*plan));
-    ASSERT_TRUE(program) << program.error().message;
-    ASSERT_TRUE((*program)->run());
+    auto executable = Executable::create(test_device(), std::move(*plan));
+    ASSERT_TRUE(executable) << executable.error().message;
+    ASSERT_TRUE((*executable)->run());
     const HostMatrix parted = k.read(out);
     ASSERT_TRUE(k.compile_and_run());
     EXPECT_EQ(parted.values, k.read(out).values);

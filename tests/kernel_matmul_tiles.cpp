@@ -31,7 +31,7 @@ std::vector<MatmulTile> tiles_with_room(const Kernel& kernel)
     const DeviceLimits& limits = test_device().limits();
     const KernelVariant& variant = Graph(limits).variant(kernel);
     std::vector<MatmulTile> tiles;
-    if (variant.needs & kNeedsCooperativeMatrix)
+    if (variant.features & kFeatureCooperativeMatrix)
         std::ranges::copy_if(kTiles, std::back_inserter(tiles),
                              [&](const MatmulTile& t) { return has_room_for(variant, limits, t); });
     return tiles;
@@ -120,7 +120,7 @@ TEST(kernel_matmul_tiles, fill_the_units_of_a_device)
 {
     DeviceLimits limits;
     limits.type = DeviceType::discrete;
-    limits.needs_supported = ~0u;
+    limits.features = ~0u;
     limits.matrix = {.m = 16, .n = 16, .k = 16, .subgroup = 32};
     limits.max_shared_bytes = 49152;
     limits.max_group_threads = 1024;

@@ -3,8 +3,8 @@
 // needs: device posix
 #include "kernels/network.h"
 #include "runtime/device/device.h"
+#include "runtime/device/executable.h"
 #include "runtime/device/pipeline.h"
-#include "runtime/device/program.h"
 #include "tests/support/cache_home.h"
 
 #include <gtest/gtest.h>
@@ -44,23 +44,23 @@ class Product {
         const Tensor w = matrix(*w_);
         (void)gemm(g, gemm(g, matrix(*x_), w, {}, {.dtype = DType::f32}), w, {},
                    {.dtype = DType::f32, .part = {.whole = matrix(*y_)}});
-        auto program = Program::create(device, g);
-        SR_ASSERT(bool(program), "{}", program.error().message);
-        program_ = std::move(*program);
+        auto executable = Executable::create(device, g);
+        SR_ASSERT(bool(executable), "{}", executable.error().message);
+        executable_ = std::move(*executable);
     }
     std::vector<std::byte> run()
     {
         std::vector<std::byte> bytes(y_->bytes());
-        EXPECT_TRUE(program_->run());
+        EXPECT_TRUE(executable_->run());
         EXPECT_TRUE(device_.read(y_->slice(), bytes));
         return bytes;
     }
-    uint32_t tile() const { return program_->plan().passes[0].grid.tile.rows; }
+    uint32_t tile() const { return executable_->plan().passes[0].grid.tile.rows; }
 
   private:
     Device& device_;
     std::unique_ptr<Buffer> x_, w_, y_;
-    std::unique_ptr<Program> program_;
+    std::unique_ptr<Executable> executable_;
 };
 
 TEST(runtime_autotune, tries_tiles_with_the_same_bytes_and_keeps_one)

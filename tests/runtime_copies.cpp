@@ -13,11 +13,11 @@ namespace runtime_copies_test {
 
 constexpr uint32_t kSize = 5000;
 
-// a slot, and a program that counts every element up
+// a slot, and an executable that counts every element up
 struct Counter {
-    State state;
-    Slot x = state.slot(kSize, 1, DType::u32, "x", 1), one = state.slot(kSize, 1, DType::u32, "other", 1);
-    std::unique_ptr<Program> program;
+    TensorPool state;
+    DeviceTensor x = state.tensor(kSize, 1, DType::u32, "x", 1), one = state.tensor(kSize, 1, DType::u32, "other", 1);
+    std::unique_ptr<Executable> executable;
 
     Counter()
     {
@@ -29,8 +29,8 @@ struct Counter {
     {
         Graph g(test_device().limits());
         g.keep(fill(g, kSize, 100 * i), x);
-        SR_TRY(program, Program::create(test_device(), g));
-        return program->submit().map([](uint64_t) {});
+        SR_TRY(executable, Executable::create(test_device(), g));
+        return executable->submit().map([](uint64_t) {});
     }
 };
 
@@ -62,18 +62,18 @@ TEST(runtime_copies, what_is_freed_while_it_is_copied_is_freed_afterwards)
 {
     constexpr uint32_t kWords = 1 << 22; // a copy takes longer than to free it
     const auto copies = std::move(*CopyRing::create(test_device()));
-    const auto state_of = [](State& state) {
-        const Slot slot = state.slot(kWords, 1, DType::u32, "words", 1);
+    const auto state_of = [](TensorPool& state) {
+        const DeviceTensor slot = state.tensor(kWords, 1, DType::u32, "words", 1);
         EXPECT_TRUE(state.allocate(test_device(), "words"));
         return slot;
     };
-    State kept;
-    const Slot to = state_of(kept);
+    TensorPool kept;
+    const DeviceTensor to = state_of(kept);
     for (uint32_t i = 1; i <= 5; ++i) {
         const std::vector<uint32_t> numbers(kWords, i);
         {
-            State from;
-            const Slot slot = state_of(from);
+            TensorPool from;
+            const DeviceTensor slot = state_of(from);
             ASSERT_TRUE(slot.write(test_device(), numbers));
             for (int k = 0; k < 3; ++k)
                 ASSERT_TRUE(copies->copy(slot, to));
@@ -151,9 +151,9 @@ TEST(runtime_copies, a_sink_gets_the_slices_in_order_in_pieces_that_make_them_up
     for (const char* limits : {"", "staging=1"}) { // from memory that the host sees, and through the window
         auto device = Device::create({.limits = limits});
         ASSERT_TRUE(device);
-        State state;
-        const Slot large = state.slot(5000001, 1, DType::u32, "large", 1),
-                   small = state.slot(3, 1, DType::u32, "small", 1);
+        TensorPool state;
+        const DeviceTensor large = state.tensor(5000001, 1, DType::u32, "large", 1),
+                           small = state.tensor(3, 1, DType::u32, "small", 1);
         ASSERT_TRUE(state.allocate(**device, "slots"));
         std::vector<std::vector<uint32_t>> expected = {std::vector<uint32_t>(5000001), {7, 8, 9}};
         std::iota(expected[0].begin(), expected[0].end(), 1u);

@@ -3,10 +3,10 @@
 // needs: device posix
 #include "kernels/network.h"
 #include "runtime/device/device.h"
+#include "runtime/device/executable.h"
 #include "runtime/device/pipeline.h"
 #include "runtime/device/profile.h"
-#include "runtime/device/program.h"
-#include "runtime/device/state.h"
+#include "runtime/device/tensor_pool.h"
 #include "tests/support/cache_home.h"
 #include "tests/support/host_vulkan.h"
 #include "tests/support/json_text.h"
@@ -60,9 +60,9 @@ void run_small_graph(Device& device)
     const auto x = make_buffer(device, 4096), out = make_buffer(device, 4096);
     const std::vector<float> ones(1024, 1.f);
     ASSERT_TRUE(device.write(x->slice(), std::as_bytes(std::span(ones))));
-    auto program = Program::create(device, small_graph(device.limits(), *x, *out));
-    ASSERT_TRUE(program) << program.error().message;
-    const Status status = (*program)->run();
+    auto executable = Executable::create(device, small_graph(device.limits(), *x, *out));
+    ASSERT_TRUE(executable) << executable.error().message;
+    const Status status = (*executable)->run();
     ASSERT_TRUE(status) << status.error().message;
     std::vector<float> y(1024);
     ASSERT_TRUE(device.read(out->slice(), std::as_writable_bytes(std::span(y))));
@@ -143,7 +143,7 @@ TEST(runtime_device, takes_every_limit_that_it_can_lower)
     EXPECT_EQ(l.max_texel_elements, 4096u);
     EXPECT_EQ(l.max_allocation, 2000000u);
     EXPECT_EQ(l.max_groups, 100u);
-    EXPECT_EQ(l.needs_supported & (kNeedsFloat16 | kNeedsSubgroupBallot), 0u);
+    EXPECT_EQ(l.features & (kFeatureFloat16 | kFeatureSubgroupBallot), 0u);
     EXPECT_TRUE(l.force_staging && l.side_by_side);
     EXPECT_EQ(l.submit_seconds, 0.5);
     EXPECT_EQ(l.force_variant, "simt");
@@ -162,9 +162,9 @@ TEST(runtime_device, refuses_memory_beyond_the_budget_with_numbers)
     Graph g(device->limits());
     const Tensor x = g.external(some->slice(), 64, 1024, DType::f32, "x");
     (void)gelu(g, silu(g, gelu(g, x))); // two of 262144 bytes at a time fit, but not three
-    EXPECT_TRUE(Program::create(*device, g));
+    EXPECT_TRUE(Executable::create(*device, g));
     const auto little = make_buffer(*device, 500000);
-    EXPECT_TRUE(says(Program::create(*device, g), "graph arena: 524288 bytes do not fit"));
+    EXPECT_TRUE(says(Executable::create(*device, g), "graph arena: 524288 bytes do not fit"));
     EXPECT_EQ(device->budget(), 1u << 20);
 }
 
@@ -192,15 +192,15 @@ TEST(runtime_device, refuses_one_allocation_that_is_too_large_with_numbers)
         EXPECT_EQ(buffer.error().code, ErrorCode::out_of_memory);
     }
     EXPECT_EQ(device->allocated_bytes(), 0u);
-    State state;
+    TensorPool state;
     for (int i = 0; i < 5; ++i)
-        (void)state.slot(100000, 1, DType::u32, "slot", 1); // two a block
+        (void)state.tensor(100000, 1, DType::u32, "slot", 1); // two a block
     EXPECT_EQ(state.planned_bytes(device->limits()), 5 * 400128u);
     ASSERT_TRUE(state.allocate(*device, "state"));
     EXPECT_EQ(device->allocated_bytes(), 5 * 400128u);
 }
 
-TEST(runtime_device, has_all_its_memory_back_after_a_hundred_programs)
+TEST(runtime_device, has_all_its_memory_back_after_a_hundred_executables)
 {
     const auto device = make_device();
     run_small_graph(*device); // staging, if any
@@ -349,16 +349,16 @@ TEST(runtime_device, runs_without_a_place_for_its_cache)
     EXPECT_EQ(reused_by_a_run(), 0u);
 }
 
-HostDevice host_of(const HostVulkan& vulkan)
+ExternalDevice external_of(const HostVulkan& vulkan)
 {
-    HostDevice host;
-    host.instance = vulkan.instance;
-    host.physical = vulkan.physical;
-    host.device = vulkan.device;
-    host.queue = vulkan.queue;
-    host.robust_buffer_access = true;
-    host.float16 = host.cooperative_matrix = vulkan.has_matrices;
-    return host;
+    ExternalDevice external;
+    external.instance = vulkan.instance;
+    external.physical = vulkan.physical;
+    external.device = vulkan.device;
+    external.queue = vulkan.queue;
+    external.robust_buffer_access = true;
+    external.float16 = external.cooperative_matrix = vulkan.has_matrices;
+    return external;
 }
 
 TEST(runtime_device, keeps_no_file_for_a_device_of_the_host_and_starts_with_what_the_host_kept)
@@ -367,14 +367,14 @@ TEST(runtime_device, keeps_no_file_for_a_device_of_the_host_and_starts_with_what
     HostVulkan vulkan;
     std::vector<char> blob;
     {
-        const auto device = Device::adopt(host_of(vulkan), {});
+        const auto device = Device::adopt(external_of(vulkan), {});
         ASSERT_TRUE(device) << device.error().message;
         EXPECT_TRUE((*device)->pipelines().file().empty());
         run_small_graph(**device);
         blob = *(*device)->pipelines().blob();
     }
     const auto reused = [&](const std::vector<char>& given) {
-        const auto device = Device::adopt(host_of(vulkan), {.pipeline_cache = std::as_bytes(std::span(given))});
+        const auto device = Device::adopt(external_of(vulkan), {.pipeline_cache = std::as_bytes(std::span(given))});
         return (*device)->pipelines().reused_bytes();
     };
     EXPECT_EQ(reused(blob), blob.size() - 16); // checksum, no tiles
@@ -398,7 +398,7 @@ TEST(runtime_device, reads_no_variable_for_a_device_of_the_host)
     const char* before = std::getenv("SEMROVER_LIMITS");
     const std::string limits = before ? before : "";
     setenv("SEMROVER_LIMITS", "colour=1", 1);
-    EXPECT_TRUE(Device::adopt(host_of(vulkan), {}));
+    EXPECT_TRUE(Device::adopt(external_of(vulkan), {}));
     EXPECT_TRUE(says(Device::create({}), "unknown limit 'colour'"));
     before ? setenv("SEMROVER_LIMITS", limits.c_str(), 1) : unsetenv("SEMROVER_LIMITS");
 }
@@ -407,17 +407,17 @@ TEST(runtime_device, works_on_a_device_that_the_host_made_and_leaves_it)
 {
     HostVulkan vulkan;
     int locks = 0, unlocks = 0;
-    HostDevice host = host_of(vulkan);
-    host.lock = [&] {
+    ExternalDevice external = external_of(vulkan);
+    external.lock = [&] {
         EXPECT_EQ(locks, unlocks);
         ++locks;
     };
-    host.unlock = [&] { ++unlocks; };
+    external.unlock = [&] { ++unlocks; };
     for (int i = 0; i < 3; ++i) {
-        auto device = Device::adopt(host, {.limits = "staging=1"});
+        auto device = Device::adopt(external, {.limits = "staging=1"});
         ASSERT_TRUE(device) << device.error().message;
         EXPECT_EQ((*device)->handle(), vulkan.device);
-        EXPECT_EQ((*device)->limits().needs_supported & kNeedsFloat16, 0u); // the host has not enabled it
+        EXPECT_EQ((*device)->limits().features & kFeatureFloat16, 0u); // the host has not enabled it
         run_small_graph(**device);
         EXPECT_EQ(locks, 3 * (i + 1)); // a write, a run, a read
         EXPECT_EQ(unlocks, locks);
@@ -436,23 +436,23 @@ std::string run_half_gemm(Device& device)
     Graph g(device.limits());
     const Tensor a = g.external(x->slice(), size, size, DType::f16, "x");
     g.keep(gemm(g, a, a, {}, {.dtype = DType::f32}), g.external(y->slice(), size, size, DType::f32, "y"));
-    auto program = Program::create(device, g);
-    SR_ASSERT(bool(program), "{}", program.error().message);
-    EXPECT_TRUE((*program)->run());
+    auto executable = Executable::create(device, g);
+    SR_ASSERT(bool(executable), "{}", executable.error().message);
+    EXPECT_TRUE((*executable)->run());
     std::vector<float> got(size * size);
     EXPECT_TRUE(device.read(y->slice(), std::as_writable_bytes(std::span(got))));
     EXPECT_EQ(got, std::vector<float>(size * size, float(size)));
-    return std::string((*program)->plan().passes[0].variant->name);
+    return std::string((*executable)->plan().passes[0].variant->name);
 }
 
 // what the hardware has, and the host has enabled and says so
 TEST(runtime_device, uses_matrix_units_of_a_host_device_where_the_host_enabled_them)
 {
-    const bool has = make_device()->limits().needs_supported & kNeedsCooperativeMatrix;
+    const bool has = make_device()->limits().features & kFeatureCooperativeMatrix;
     HostVulkan with(true), without;
     EXPECT_EQ(with.has_matrices, has);
     for (const HostVulkan* vulkan : {&with, &without}) {
-        const auto device = Device::adopt(host_of(*vulkan), {.limits = "variant=coopmat"});
+        const auto device = Device::adopt(external_of(*vulkan), {.limits = "variant=coopmat"});
         ASSERT_TRUE(device) << device.error().message;
         EXPECT_EQ(run_half_gemm(**device) == "coopmat", vulkan->has_matrices);
         EXPECT_EQ(vulkan->messages, 0);
@@ -462,24 +462,24 @@ TEST(runtime_device, uses_matrix_units_of_a_host_device_where_the_host_enabled_t
 TEST(runtime_device, refuses_a_host_device_that_lacks_something)
 {
     HostVulkan vulkan;
-    const HostDevice whole = host_of(vulkan);
-    HostDevice host = whole;
-    host.queue = VK_NULL_HANDLE;
-    EXPECT_TRUE(says(Device::adopt(host, {}),
+    const ExternalDevice whole = external_of(vulkan);
+    ExternalDevice external = whole;
+    external.queue = VK_NULL_HANDLE;
+    EXPECT_TRUE(says(Device::adopt(external, {}),
                      "a device of the application's needs instance, physical device, device and queue"));
-    host = whole;
-    host.queue_family = 77;
-    EXPECT_TRUE(says(Device::adopt(host, {}), "queue family 77 of the application's device has no compute"));
-    host = whole;
-    host.robust_buffer_access = false;
-    EXPECT_TRUE(
-        says(Device::adopt(host, {}), "a device of the application's needs robustBufferAccess or pipelineRobustness"));
-    host = whole;
-    host.cooperative_matrix = true;
-    EXPECT_TRUE(says(Device::adopt(host, {}), "with cooperative matrices needs shaderFloat16"));
-    host = whole;
-    host.lock = [] {};
-    EXPECT_TRUE(says(Device::adopt(host, {}), "needs both of lock and unlock, or neither"));
+    external = whole;
+    external.queue_family = 77;
+    EXPECT_TRUE(says(Device::adopt(external, {}), "queue family 77 of the application's device has no compute"));
+    external = whole;
+    external.robust_buffer_access = false;
+    EXPECT_TRUE(says(Device::adopt(external, {}),
+                     "a device of the application's needs robustBufferAccess or pipelineRobustness"));
+    external = whole;
+    external.cooperative_matrix = true;
+    EXPECT_TRUE(says(Device::adopt(external, {}), "with cooperative matrices needs shaderFloat16"));
+    external = whole;
+    external.lock = [] {};
+    EXPECT_TRUE(says(Device::adopt(external, {}), "needs both of lock and unlock, or neither"));
     EXPECT_TRUE(says(Device::adopt(whole, {.limits = "colour=1"}), "unknown limit 'colour'"));
     EXPECT_EQ(vulkan.messages, 0);
 }

@@ -88,7 +88,7 @@ std::string header(const std::string& op, const std::vector<fs::path>& files)
         out += arrays(id, m);
         table += fmt::format(
             "    {{\"{}\", {}_code, {}_bindings, {}_constants, {}_push, {}, {{{}, {}, {}}}, {}_shared, {}}},\n",
-            variant, id, id, id, id, m.push_bytes, m.local_size[0], m.local_size[1], m.local_size[2], id, m.needs);
+            variant, id, id, id, id, m.push_bytes, m.local_size[0], m.local_size[1], m.local_size[2], id, m.features);
     }
     out +=
         fmt::format("inline constexpr KernelVariant {}_variants[] = {{\n{}}};\n}} // namespace generated\n", op, table);

@@ -140,7 +140,7 @@ class Reader {
             break;
         case kOpTypeCooperativeMatrix: // component, scope, rows, columns, use
             if (ids_[w[1]].operands.at(0) == 16 && ids_[w[5]].operands.at(0) == 2) // fp16 sums
-                module_.needs |= 32;
+                module_.features |= 32;
             break;
         case kOpSRem:
         case kOpSMod:
@@ -159,17 +159,17 @@ class Reader {
     void capability(uint32_t c)
     {
         if (c == 62) // GroupNonUniformVote
-            module_.needs |= 64;
+            module_.features |= 64;
         if (c == 63) // GroupNonUniformArithmetic
-            module_.needs |= 1;
+            module_.features |= 1;
         if (c == 64) // GroupNonUniformBallot
-            module_.needs |= 2;
+            module_.features |= 2;
         if (c == 65 || c == 66) // GroupNonUniformShuffle, ShuffleRelative
-            module_.needs |= 4;
+            module_.features |= 4;
         if (c == 9) // Float16
-            module_.needs |= 8;
+            module_.features |= 8;
         if (c == 6022 || c == 5357) // CooperativeMatrixKHR, NV
-            module_.needs |= 16;
+            module_.features |= 16;
     }
 
     static void decorate(Id& id, uint32_t decoration, uint32_t value)

@@ -35,7 +35,7 @@ struct Module {
     uint32_t push_bytes = 0;
     uint32_t local_size[3] = {1, 1, 1};
     std::string shared_bytes = "0u"; // as C++: of c, the constants' values in the order above
-    uint32_t needs = 0;              // KernelNeeds of runtime/graph/kernel.h
+    uint32_t features = 0;           // KernelFeatures of runtime/graph/kernel.h
 };
 
 // throws std::runtime_error with a message that names what is wrong (a build-time tool)

@@ -15,11 +15,11 @@ CameraRenderer::CameraRenderer(Device& device, const LatentSize& size, const Ren
     chain_.warped_noise = settings.frame_noise == FrameNoise::warped;
     chain_.history = settings.frame_history;
     const uint32_t pixels = size.image_width * size.image_height;
-    seen_ = state_.slot(pixels, 1, DType::u32, "seen", 1);
+    seen_ = state_.tensor(pixels, 1, DType::u32, "seen", 1);
     if (settings.follows_surfaces())
-        depths_ = state_.slot(divide_up(pixels, 2), 1, DType::u32, "depths", 1);
-    bytes_ = state_.slot(picture_words(size.image_width, size.image_height), 1, DType::u32, "bytes", 1);
-    texels_ = state_.slot(pixels, 1, DType::u32, "texels", 1);
+        depths_ = state_.tensor(divide_up(pixels, 2), 1, DType::u32, "depths", 1);
+    bytes_ = state_.tensor(picture_words(size.image_width, size.image_height), 1, DType::u32, "bytes", 1);
+    texels_ = state_.tensor(pixels, 1, DType::u32, "texels", 1);
 }
 
 Result<std::unique_ptr<CameraRenderer>> CameraRenderer::create(Device& device, std::shared_ptr<LoadedNetworks> networks,
@@ -45,19 +45,19 @@ Status CameraRenderer::make(std::shared_ptr<LoadedNetworks> networks, RendererSe
     SR_TRY(copies_, CopyRing::create(device_));
     Graph g(device_.limits());
     g.keep(picture_texels(g, bytes_.in(g), size.image_width * size.image_height), texels_);
-    SR_TRY(to_texels_, Program::create(device_, g));
+    SR_TRY(to_texels_, Executable::create(device_, g));
     const CameraChain* chain = &chain_;
     SR_TRY(renderer_, DeferredRenderer::create(device_, std::move(networks), std::move(settings), std::move(plan),
                                                {&chain, 1}, *this));
     return {};
 }
 
-Status CameraRenderer::fill(const Slot& seen)
+Status CameraRenderer::fill(const DeviceTensor& seen)
 {
     return copies_->copy(seen, seen_).map([](uint64_t) {});
 }
 
-Status CameraRenderer::read_seen(const CameraChain&, uint32_t, const Slot& to)
+Status CameraRenderer::read_seen(const CameraChain&, uint32_t, const DeviceTensor& to)
 {
     return copies_->copy(seen_, to).map([](uint64_t) {});
 }
@@ -68,7 +68,7 @@ Result<FrameView> CameraRenderer::view(const CameraChain&, uint32_t frame)
     return view_;
 }
 
-Status CameraRenderer::save_frame(const CameraChain&, uint32_t, const Slot& pixels)
+Status CameraRenderer::save_frame(const CameraChain&, uint32_t, const DeviceTensor& pixels)
 {
     SR_CHECK(copies_->copy(pixels, bytes_).map([](uint64_t) {}));
     return to_texels_->run();

@@ -20,10 +20,10 @@ class CameraRenderer : private FrameStore {
 
     // the splat buffer of the next frame, PixelWords::seen: to be filled before begin(), and left alone until the frame
     // is done
-    const Slot& seen() const { return seen_; }
-    Status fill(const Slot& seen); // a copy, behind what was submitted before
+    const DeviceTensor& seen() const { return seen_; }
+    Status fill(const DeviceTensor& seen); // a copy, behind what was submitted before
     // the application's millimetres on their way here, two a word; none where nobody reads them
-    const Slot& depths() const { return depths_; }
+    const DeviceTensor& depths() const { return depths_; }
 
     // One frame: begin, step until it says true; the result is texels() until the next frame ends. Where
     // settings().follows_surfaces(), the view says what it shares with the frame before; else it is not read. A step
@@ -37,8 +37,8 @@ class CameraRenderer : private FrameStore {
 
     void restart(); // the next frame has none before it
 
-    const Slot& texels() const { return texels_; } // [height * width] u32: red, green, blue, 255
-    uint32_t frames() const { return frames_; }    // finished since the camera began
+    const DeviceTensor& texels() const { return texels_; } // [height * width] u32: red, green, blue, 255
+    uint32_t frames() const { return frames_; }            // finished since the camera began
     const RendererSettings& settings() const { return renderer_->settings(); }
     const RendererModel& model() const { return renderer_->model(); }
     const MemoryPlan& memory() const { return renderer_->memory(); }
@@ -46,16 +46,16 @@ class CameraRenderer : private FrameStore {
   private:
     CameraRenderer(Device& device, const LatentSize& size, const RendererSettings& settings, const std::string& camera);
     Status make(std::shared_ptr<LoadedNetworks> networks, RendererSettings settings);
-    Status read_seen(const CameraChain& chain, uint32_t frame, const Slot& to) override;
+    Status read_seen(const CameraChain& chain, uint32_t frame, const DeviceTensor& to) override;
     Result<FrameView> view(const CameraChain& chain, uint32_t frame) override;
-    Status save_frame(const CameraChain& chain, uint32_t frame, const Slot& pixels) override;
+    Status save_frame(const CameraChain& chain, uint32_t frame, const DeviceTensor& pixels) override;
 
     Device& device_;
     CameraChain chain_;
-    State state_;
-    Slot seen_, depths_, bytes_, texels_;
+    TensorPool state_;
+    DeviceTensor seen_, depths_, bytes_, texels_;
     std::unique_ptr<CopyRing> copies_;
-    std::unique_ptr<Program> to_texels_;
+    std::unique_ptr<Executable> to_texels_;
     std::unique_ptr<DeferredRenderer> renderer_;
 
     bool busy_ = false;

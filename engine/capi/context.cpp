@@ -52,26 +52,26 @@ Result<std::unique_ptr<Device>> adopt(const sr_vulkan_device& v, const DeviceOpt
 {
     if (v.reserved)
         return fail(ErrorCode::usage, "sr_vulkan_device: reserved is not 0");
-    HostDevice host;
-    host.get_instance_proc_addr = v.get_instance_proc_addr;
-    host.instance = v.instance;
-    host.physical = v.physical_device;
-    host.device = v.device;
-    host.queue = v.queue;
-    host.queue_family = v.queue_family;
-    host.work_queue = v.work_queue;
-    host.work_queue_family = v.work_queue_family;
-    host.float16 = v.shader_float16;
-    host.cooperative_matrix = v.cooperative_matrix;
-    host.robust_buffer_access = v.robust_buffer_access == 1;
-    host.pipeline_robustness = v.pipeline_robustness == 1;
-    host.sharing = {v.external_memory_fd == 1, v.external_semaphore_fd == 1};
-    host.memory = memory_source(v);
+    ExternalDevice external;
+    external.get_instance_proc_addr = v.get_instance_proc_addr;
+    external.instance = v.instance;
+    external.physical = v.physical_device;
+    external.device = v.device;
+    external.queue = v.queue;
+    external.queue_family = v.queue_family;
+    external.work_queue = v.work_queue;
+    external.work_queue_family = v.work_queue_family;
+    external.float16 = v.shader_float16;
+    external.cooperative_matrix = v.cooperative_matrix;
+    external.robust_buffer_access = v.robust_buffer_access == 1;
+    external.pipeline_robustness = v.pipeline_robustness == 1;
+    external.exportable = {v.external_memory_fd == 1, v.external_semaphore_fd == 1};
+    external.memory = memory_source(v);
     if (v.lock_queue)
-        host.lock = [=] { v.lock_queue(v.user); };
+        external.lock = [=] { v.lock_queue(v.user); };
     if (v.unlock_queue)
-        host.unlock = [=] { v.unlock_queue(v.user); };
-    return Device::adopt(host, options);
+        external.unlock = [=] { v.unlock_queue(v.user); };
+    return Device::adopt(external, options);
 }
 
 Result<std::unique_ptr<sr_context>> make_context(const sr_context_desc& desc)

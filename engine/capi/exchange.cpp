@@ -15,10 +15,10 @@ VkImageAspectFlags aspect_of(uint32_t format)
 
 } // namespace
 
-Result<HostCopies*> copies_of(sr_context& context)
+Result<ExternalCopies*> copies_of(sr_context& context)
 {
     if (!context.copies) {
-        SR_TRY(context.copies, HostCopies::create(*context.drawing));
+        SR_TRY(context.copies, ExternalCopies::create(*context.drawing));
     }
     return context.copies.get();
 }
@@ -40,27 +40,27 @@ Status hand_over(sr_context& context, std::span<const WantedPicture> pictures)
 {
     std::vector<BufferSlice> read;
     std::vector<std::byte*> memory; // of these
-    std::vector<HostCopy> copied;
+    std::vector<ExternalCopy> copied;
     for (const auto& [pixels, target, size] : pictures) {
         if (target->memory) {
             read.push_back(pixels);
             memory.push_back(static_cast<std::byte*>(target->memory));
         }
         if (target->buffer || target->image)
-            copied.push_back({pixels, host_target(*target, size)});
+            copied.push_back({pixels, external_target(*target, size)});
     }
     if (!read.empty())
         SR_CHECK(context.drawing->read(
             read, [&](const ReadPiece& piece) { std::ranges::copy(piece.bytes, memory[piece.slice] + piece.at); }));
     if (copied.empty())
         return {};
-    SR_TRY(HostCopies * copies, copies_of(context));
+    SR_TRY(ExternalCopies * copies, copies_of(context));
     return copies->copy(copied);
 }
 
-HostTarget host_target(const sr_target& to, const ImageSize& size)
+ExternalTarget external_target(const sr_target& to, const ImageSize& size)
 {
-    HostTarget target{.buffer = to.buffer, .offset = to.buffer_offset};
+    ExternalTarget target{.buffer = to.buffer, .offset = to.buffer_offset};
     target.image = {to.image,
                     size.width,
                     size.height,
@@ -83,7 +83,7 @@ std::vector<WantedPicture> wanted_pictures(const sr_draw_desc& draw, const Pictu
     return wanted;
 }
 
-Result<HostImage> host_depth(const sr_depth_image& d, const ImageSize& size)
+Result<ExternalImage> external_depth(const sr_depth_image& d, const ImageSize& size)
 {
     if (d.format != VK_FORMAT_D32_SFLOAT && d.format != VK_FORMAT_R32_SFLOAT)
         return fail(ErrorCode::usage, "sr_depth_image: format {} is neither D32_SFLOAT nor R32_SFLOAT", d.format);
@@ -92,12 +92,12 @@ Result<HostImage> host_depth(const sr_depth_image& d, const ImageSize& size)
     constexpr double most = std::numeric_limits<float>::max();
     SR_CHECK(number_in(d.scale, -most, most, "sr_depth_image", "scale").map([](double) {}));
     SR_CHECK(number_in(d.offset, -most, most, "sr_depth_image", "offset").map([](double) {}));
-    return HostImage{d.image,
-                     size.width,
-                     size.height,
-                     VkImageLayout(d.layout_before),
-                     VkImageLayout(d.layout_after),
-                     aspect_of(d.format)};
+    return ExternalImage{d.image,
+                         size.width,
+                         size.height,
+                         VkImageLayout(d.layout_before),
+                         VkImageLayout(d.layout_after),
+                         aspect_of(d.format)};
 }
 
 std::array<float, 2> z_scale(const sr_depth_image& d)
@@ -110,14 +110,14 @@ std::array<float, 2> depth_scale(const sr_draw_desc& d)
     return {float(d.depth_scale), float(d.depth_offset)};
 }
 
-Status take_in(sr_context& context, const sr_source& from, const Slot& to, uint64_t bytes, const char* name)
+Status take_in(sr_context& context, const sr_source& from, const DeviceTensor& to, uint64_t bytes, const char* name)
 {
     if (!from.memory == !from.buffer)
         return fail(ErrorCode::usage, "{}: one of memory and buffer must be given", name);
     const BufferSlice slice = to.slice().part(0, bytes);
     if (from.memory)
         return context.device->write(slice, {static_cast<const std::byte*>(from.memory), size_t(bytes)});
-    SR_TRY(HostCopies * copies, copies_of(context));
+    SR_TRY(ExternalCopies * copies, copies_of(context));
     return copies->fetch(from.buffer, from.buffer_offset, slice);
 }
 

@@ -17,15 +17,15 @@ JobBudget timed_budget(uint64_t microseconds);
 // Errors: usage for sizes that are not 1..kMostPixels. name: of the structure
 Status check_size(const ImageSize& size, const char* name);
 
-HostTarget host_target(const sr_target& to, const ImageSize& size);
+ExternalTarget external_target(const sr_target& to, const ImageSize& size);
 
 // What a draw is tested against. Errors: usage for another format than two, layouts that are UNDEFINED, and numbers
 // that are not finite
-Result<HostImage> host_depth(const sr_depth_image& depth, const ImageSize& size);
+Result<ExternalImage> external_depth(const sr_depth_image& depth, const ImageSize& size);
 std::array<float, 2> z_scale(const sr_depth_image& depth);
 std::array<float, 2> depth_scale(const sr_draw_desc& draw); // of the picture
 
-Result<HostCopies*> copies_of(sr_context& context);
+Result<ExternalCopies*> copies_of(sr_context& context);
 
 // a picture, and where the application wants it
 struct WantedPicture {
@@ -37,7 +37,7 @@ Status hand_over(sr_context& context, std::span<const WantedPicture> pictures); 
 
 // `bytes` of the application's to the beginning of a slot; waits for it. Errors: usage unless there is one of memory
 // and buffer. name: of the member
-Status take_in(sr_context& context, const sr_source& from, const Slot& to, uint64_t bytes, const char* name);
+Status take_in(sr_context& context, const sr_source& from, const DeviceTensor& to, uint64_t bytes, const char* name);
 
 // What is wanted of a draw. kept: as draw_splats() returns it
 std::vector<WantedPicture> wanted_pictures(const sr_draw_desc& draw, const PictureFormats& formats, SplatSlots kept);

@@ -96,7 +96,7 @@ PictureFormats formats_of(const sr_gl_draw_desc& d)
 
 // a picture, the room that it goes through, and the texture that wants it
 struct Wanted {
-    Slot from;
+    DeviceTensor from;
     GlRoom* room;
     GlTexture texture;
     const char* what;
@@ -200,7 +200,7 @@ Status send_splats(sr_gl& gl, const SplatPool& pool)
     GlLink& link = *gl.link;
     const uint64_t rows = pool.end(), room = pool.scene().size();
     const auto [positions, normals, colors, labels, cells, owners] = pool.scene().arrays();
-    const Slot arrays[] = {positions, normals, colors, labels, pool.scene().blocks()};
+    const DeviceTensor arrays[] = {positions, normals, colors, labels, pool.scene().blocks()};
     std::vector<GlLink::Piece> pieces;
     for (size_t i = 0; i < std::size(gl.splats); ++i) {
         const BufferSlice all = arrays[i].slice();

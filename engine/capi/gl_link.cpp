@@ -66,7 +66,7 @@ Status GlLink::pick_way(GlLoader loader, sr_gl_way best)
 
 Status GlLink::refuse_memory(GlLoader loader)
 {
-    if (!device_.sharing().memory)
+    if (!device_.exportable().memory)
         return fail(ErrorCode::no_device, "the device does not export memory by file descriptor, or the context was "
                                           "created without share_by_fd");
     for (const char* name : {"GL_EXT_memory_object", "GL_EXT_memory_object_fd"})
@@ -135,7 +135,7 @@ Status GlLink::try_memory()
 
 Status GlLink::refuse_semaphores(GlLoader loader)
 {
-    if (!device_.sharing().semaphores)
+    if (!device_.exportable().semaphores)
         return fail(ErrorCode::no_device, "the device does not export semaphores by file descriptor");
     for (const char* name : {"GL_EXT_semaphore", "GL_EXT_semaphore_fd"})
         if (!gl_.has_extension(name))
@@ -145,9 +145,9 @@ Status GlLink::refuse_semaphores(GlLoader loader)
     return import_semaphore(read_, read_name_);
 }
 
-Status GlLink::import_semaphore(std::unique_ptr<SharedSemaphore>& semaphore, GlName& name)
+Status GlLink::import_semaphore(std::unique_ptr<ExportedSemaphore>& semaphore, GlName& name)
 {
-    SR_TRY(semaphore, SharedSemaphore::create(device_));
+    SR_TRY(semaphore, ExportedSemaphore::create(device_));
     SR_TRY(const int descriptor, semaphore->descriptor());
     gl_.GenSemaphoresEXT(1, &name);
     gl_.ImportSemaphoreFdEXT(name, gl::kHandleTypeOpaqueFd, descriptor); // which is GL's now
@@ -178,7 +178,7 @@ Status GlLink::make_room(GlRoom& room, uint64_t bytes, bool named, const char* n
 
 Status GlLink::import_memory(GlRoom& room, uint64_t bytes, const char* name)
 {
-    SR_TRY(room.shared, Buffer::create(device_, bytes + kBehind, MemoryKind::shared, name));
+    SR_TRY(room.shared, Buffer::create(device_, bytes + kBehind, MemoryKind::exportable, name));
     const Buffer& buffer = *room.shared;
     shared_bytes_ += buffer.memory_bytes();
     SR_TRY(const int descriptor, buffer.descriptor());
@@ -221,7 +221,7 @@ Status GlLink::finish(VkCommandBuffer commands, std::span<const Piece> pieces)
 {
     for (const Piece& piece : pieces) {
         const VkBuffer to = piece.to->shared->handle();
-        record_host_target(device_, commands, piece.from, {.buffer = to});
+        record_external_target(device_, commands, piece.from, {.buffer = to});
         record_share(device_.vk(), commands, to, device_.queue_family());
     }
     if (way_ == SR_GL_SHARED_MEMORY) {

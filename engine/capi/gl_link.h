@@ -3,8 +3,8 @@
 #pragma once
 
 #include "engine/capi/gl_calls.h"
-#include "runtime/device/host_copies.h"
-#include "runtime/device/sharing.h"
+#include "runtime/device/exportable.h"
+#include "runtime/device/external_copies.h"
 
 // the way that bytes take from the device to a GL context
 namespace semrover::capi {
@@ -65,7 +65,7 @@ class GlLink {
     Status compare_drivers() const;
     Status try_memory();
     Status import_memory(GlRoom& room, uint64_t bytes, const char* name);
-    Status import_semaphore(std::unique_ptr<SharedSemaphore>& semaphore, GlName& name);
+    Status import_semaphore(std::unique_ptr<ExportedSemaphore>& semaphore, GlName& name);
     Status copy_to_host(std::span<const Piece> pieces);
 
     Device& device_;
@@ -74,7 +74,7 @@ class GlLink {
     std::string reason_;
     uint64_t shared_bytes_ = 0, copied_bytes_ = 0;
     std::unique_ptr<CommandRing> commands_;
-    std::unique_ptr<SharedSemaphore> drawn_, read_; // by the device, by GL
+    std::unique_ptr<ExportedSemaphore> drawn_, read_; // by the device, by GL
     GlName drawn_name_ = 0, read_name_ = 0;
 };
 

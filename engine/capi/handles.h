@@ -12,7 +12,7 @@
 #include "engine/semrover_vulkan.h"
 #include "engine/world/world.h"
 #include "runtime/device/device.h"
-#include "runtime/device/host_copies.h"
+#include "runtime/device/external_copies.h"
 
 #include <atomic>
 #include <mutex>
@@ -25,8 +25,8 @@ struct sr_context {
     semrover::DeviceSummary summary;
     mutable std::mutex error_mutex;
     std::string error;
-    std::unique_ptr<semrover::HostCopies> copies; // by the drawing device, from the first call that needs them on
-    uint64_t worlds = 0;                          // made so far
+    std::unique_ptr<semrover::ExternalCopies> copies; // by the drawing device, from the first call that needs them on
+    uint64_t worlds = 0;                              // made so far
 };
 
 // Voxels that are set are put into the grid when it is next read: one by one each would cost the whole grid.

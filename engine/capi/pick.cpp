@@ -31,7 +31,7 @@ Result<sr_pick> pick(sr_world& world, sr_draw_desc d, uint32_t x, uint32_t y)
     SR_CHECK(show_updates(world, true));
     SR_TRY(const std::vector<SplatSlots> images, draw_splats(world, {&draw, 1}, "sr_world_pick"));
     Device& device = *world.context->drawing;
-    const auto pixel = [at = y * draw.size().width + x](const Slot& slot) { return slot.row_range(at, 1); };
+    const auto pixel = [at = y * draw.size().width + x](const DeviceTensor& slot) { return slot.row_range(at, 1); };
     SR_TRY(const std::vector<float> color, pixel(images[0].color).read<float>(device));
     SR_TRY(const std::vector<float> depth, pixel(images[0].depth).read<float>(device));
     SR_TRY(const std::vector<uint32_t> ids, pixel(images[0].ids).read<uint32_t>(device));

@@ -89,7 +89,7 @@ Result<PictureFormats> formats_of(const sr_draw_desc& draw)
     return formats;
 }
 
-uint64_t picture_bytes(const PictureFormat& format, const Slot& kept, uint32_t pixels)
+uint64_t picture_bytes(const PictureFormat& format, const DeviceTensor& kept, uint32_t pixels)
 {
     return format.texels == Texels::whole ? kept.bytes() : uint64_t(pixels) * texel_bytes(format.texels);
 }

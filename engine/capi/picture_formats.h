@@ -20,6 +20,6 @@ inline std::array<const sr_target*, 5> targets_of(const sr_draw_desc& draw)
 Result<PictureFormats> formats_of(const sr_draw_desc& draw);
 
 // of a picture that a rasterizer keeps so
-uint64_t picture_bytes(const PictureFormat& format, const Slot& kept, uint32_t pixels);
+uint64_t picture_bytes(const PictureFormat& format, const DeviceTensor& kept, uint32_t pixels);
 
 } // namespace semrover::capi

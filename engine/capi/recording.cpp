@@ -42,7 +42,7 @@ Status record(sr_world& world, const sr_draw_desc& d, VkCommandBuffer commands, 
     SR_TRY(const WorldDraw draw, draw_of(world, d, formats));
     SR_TRY(const SplatSlots images, record_splats(world, draw, commands, name));
     for (const auto& [pixels, target, size] : wanted_pictures(d, formats, images))
-        record_host_target(device, commands, pixels, host_target(*target, size));
+        record_external_target(device, commands, pixels, external_target(*target, size));
     return {};
 }
 
@@ -88,7 +88,7 @@ Result<SplatSlots> record_splats(sr_world& world, const WorldDraw& draw, VkComma
         world.retired.emplace_back(world.done, std::move(last));
     SR_TRY(Rasterizer * rasterizer, found);
     if (draw.options.depth_tested) {
-        SR_TRY(const HostImage depth, host_depth(draw.depth_test, draw.size()));
+        SR_TRY(const ExternalImage depth, external_depth(draw.depth_test, draw.size()));
         const BufferSlice z = rasterizer->z_buffer().slice();
         record_image_fetch(device.vk(), commands, depth, z.buffer->handle(), z.offset);
     }

@@ -8,20 +8,20 @@ using namespace semrover::capi;
 
 namespace {
 
-sr_array array_of(const Slot& slot)
+sr_array array_of(const DeviceTensor& slot)
 {
     const BufferSlice slice = slot.slice();
     return {slice.buffer->handle(), slice.offset, slice.bytes};
 }
 
 // what a draw reads beside splats and camera. z: of depth_test, with the layout that it has
-Status fill_inputs(sr_context& context, Rasterizer& rasterizer, const WorldDraw& draw, HostImage& z)
+Status fill_inputs(sr_context& context, Rasterizer& rasterizer, const WorldDraw& draw, ExternalImage& z)
 {
     if (rasterizer.format_scale().valid())
         SR_CHECK(rasterizer.format_scale().write(*context.drawing, draw.depth_scale));
     if (!z.image)
         return {};
-    SR_TRY(HostCopies * copies, copies_of(context));
+    SR_TRY(ExternalCopies * copies, copies_of(context));
     SR_CHECK(copies->fetch(z, rasterizer.z_buffer().slice()));
     z.before = z.after;
     return rasterizer.z_scale().write(*context.drawing, z_scale(draw.depth_test));
@@ -81,9 +81,9 @@ Result<std::vector<SplatSlots>> draw_splats(sr_world& world, std::span<const Wor
     sr_context& context = *world.context;
     SR_TRY(Rasterizer * rasterizer,
            world.images.of(*context.drawing, *splats, first.size(), first.options, uint32_t(draws.size())));
-    HostImage z;
+    ExternalImage z;
     if (first.options.depth_tested) {
-        SR_TRY(z, host_depth(first.depth_test, first.size()));
+        SR_TRY(z, external_depth(first.depth_test, first.size()));
     }
     std::vector<SplatCamera> cameras;
     std::vector<CameraFrame> frames;

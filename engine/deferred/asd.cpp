@@ -14,8 +14,8 @@ constexpr uint32_t kNoiseRows = 2; // rows of the step table before the plan's: 
 
 struct AsdRenderer::FrameMemory : Denoiser::Memory {
     float guidance_scale;
-    Slot previous;                    // latent of the frame before; begin_graph() puts noise on it
-    Slot first_noise, previous_noise; // where noise comes from the host
+    DeviceTensor previous;                    // latent of the frame before; begin_graph() puts noise on it
+    DeviceTensor first_noise, previous_noise; // where noise comes from the host
 
     FrameMemory(const Unet& u, const SamplingPlan& p, uint32_t text_tokens, const LatentSize& size, const AsdOptions& o)
         : Memory(u, p, {size, 1, o.guidance_scale == 1.f ? 1u : 2u, kNoiseRows, text_tokens}, o.seed),

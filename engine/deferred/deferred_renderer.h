@@ -48,10 +48,10 @@ class FrameStore {
     virtual ~FrameStore() = default;
 
     // what splats cover, [image pixels] u32 as splat_pixels() makes it, to the encoder's slot
-    virtual Status read_seen(const CameraChain& chain, uint32_t frame, const Slot& to) = 0;
+    virtual Status read_seen(const CameraChain& chain, uint32_t frame, const DeviceTensor& to) = 0;
     virtual Result<FrameView> view(const CameraChain& chain, uint32_t frame) = 0;
     // pixels: as picture_bytes() makes them, good until the next task
-    virtual Status save_frame(const CameraChain& chain, uint32_t frame, const Slot& pixels) = 0;
+    virtual Status save_frame(const CameraChain& chain, uint32_t frame, const DeviceTensor& pixels) = 0;
     virtual Status save_latent(const CameraChain&, uint32_t, const std::vector<float>&) { return {}; }
 
     // true: save_encoded() takes what the staged policy encodes, all of it before anything is denoised

@@ -8,21 +8,21 @@
 
 namespace semrover {
 
-DenoiserTables::DenoiserTables(State& state, const Unet& unet, const SamplingPlan& plan, uint32_t rows_before,
+DenoiserTables::DenoiserTables(TensorPool& state, const Unet& unet, const SamplingPlan& plan, uint32_t rows_before,
                                uint32_t text_tokens)
     : first_rows(rows_before), tokens(text_tokens)
 {
     constexpr uint32_t kWords = sizeof(StepRow) / 4;
     const uint32_t count = uint32_t(plan.timesteps.size()), numbers = unet.config().added_numbers;
-    steps = state.slot(uint32_t(plan.rows.size()) + first_rows, kWords, DType::u32, "steps", kWords);
-    clock = ReplayMemory::clock_slot(state);
-    timesteps_ = state.slot(count, 1, DType::f32, "timesteps", 1);
-    times = state.slot(count, unet.time_width(), DType::f32, "times");
+    steps = state.tensor(uint32_t(plan.rows.size()) + first_rows, kWords, DType::u32, "steps", kWords);
+    clock = StepMemory::clock_tensor(state);
+    timesteps_ = state.tensor(count, 1, DType::f32, "timesteps", 1);
+    times = state.tensor(count, unet.time_width(), DType::f32, "times");
     if (numbers)
-        added_ = state.slot(count, numbers, DType::f32, "added numbers", numbers);
+        added_ = state.tensor(count, numbers, DType::f32, "added numbers", numbers);
     if (const uint32_t rows = round_up(tokens, kImageRowPadding); rows && unet.context_width()) {
-        context_ = state.slot(rows, unet.config().cross_attention_dim, unet.precision(), "conditioning");
-        text = state.slot(rows, unet.context_width(), unet.precision(), "text");
+        context_ = state.tensor(rows, unet.config().cross_attention_dim, unet.precision(), "conditioning");
+        text = state.tensor(rows, unet.context_width(), unet.precision(), "text");
     }
 }
 
@@ -61,13 +61,13 @@ Denoiser::Memory::Memory(const Unet& u, const SamplingPlan& p, const Shape& shap
       pixels(shape.size.pixels()), image_rows(round_up(pixels, kImageRowPadding)), frames(shape.frames),
       channels(u.config().out_channels), halves(shape.halves), tables(state, u, p, shape.rows_before, shape.text_tokens)
 {
-    table_row = state.slot(halves * frames, 1, DType::u32, "table_row", 1);
-    cells = state.slot(rows(), 4, DType::i32, "cells", 4);
-    known = state.slot(rows(), 1, DType::u32, "known", 1);
+    table_row = state.tensor(halves * frames, 1, DType::u32, "table_row", 1);
+    cells = state.tensor(rows(), 4, DType::i32, "cells", 4);
+    known = state.tensor(rows(), 1, DType::u32, "known", 1);
     x = latent("x");
     x0 = latent("x0");
     buffer = latent("buffer");
-    visible = state.slot(rows(), 1, DType::f32, "visible", 1);
+    visible = state.tensor(rows(), 1, DType::f32, "visible", 1);
     bad = frame_words(state, frames, 1, "first number that is none");
 }
 
@@ -116,12 +116,12 @@ Status Denoiser::make(std::unique_ptr<Memory> memory, std::span<const StepRow> b
     SR_CHECK(m.known.clear(device_));
     SR_CHECK(write_tables());
     arena_ = std::move(arena);
-    SR_TRY(const auto tables, arena_->program(m.tables_graph(device_.limits())));
+    SR_TRY(const auto tables, arena_->executable(m.tables_graph(device_.limits())));
     SR_CHECK(tables->run());
-    SR_TRY(begin_, arena_->program(m.begin_graph(device_.limits())));
-    SR_TRY(step_, arena_->program(m.step_graph(device_.limits())));
-    SR_TRY(check_, arena_->program(m.check_graph(device_.limits())));
-    replay_.emplace(device_, plan_.rows.size(), [this](size_t) -> Result<Program*> { return step_.get(); });
+    SR_TRY(begin_, arena_->executable(m.begin_graph(device_.limits())));
+    SR_TRY(step_, arena_->executable(m.step_graph(device_.limits())));
+    SR_TRY(check_, arena_->executable(m.check_graph(device_.limits())));
+    loop_.emplace(device_, plan_.rows.size(), [this](size_t) -> Result<Executable*> { return step_.get(); });
     return {};
 }
 
@@ -149,7 +149,7 @@ Status Denoiser::begin(const DenoiserWindow& w)
     const Memory& m = *memory_;
     SR_ASSERT(w.visible.size() == size_t(m.frames) * m.pixels && w.buffers.size() == w.visible.size() * m.channels,
               "a window of {} values for {} frames of {} pixels", w.buffers.size(), m.frames, m.pixels);
-    SR_CHECK(replay_->begin({m.tables.clock, m.x, m.x0}));
+    SR_CHECK(loop_->begin({m.tables.clock, m.x, m.x0}));
     SR_CHECK(write_frames(device_, m.buffer, m.frames, w.buffers));
     SR_CHECK(write_frames(device_, m.visible, m.frames, w.visible));
     SR_CHECK(upload(w));
@@ -160,17 +160,17 @@ Status Denoiser::begin(const DenoiserWindow& w)
 
 Result<bool> Denoiser::step(size_t submits)
 {
-    return replay_->step(submits);
+    return loop_->step(submits);
 }
 
 Status Denoiser::cancel()
 {
-    return replay_->cancel();
+    return loop_->cancel();
 }
 
 Result<std::vector<float>> Denoiser::finish()
 {
-    replay_->end();
+    loop_->end();
     SR_CHECK(check_->run());
     const Memory& m = *memory_;
     SR_CHECK(check_frame_words(device_, m.bad, m.x, m.frames, {m.width, m.height, m.width, m.height},

@@ -5,7 +5,7 @@
 #include "engine/deferred/noise_trail.h"
 #include "engine/network/unet.h"
 #include "engine/sampling/repaint.h"
-#include "engine/sampling/replay.h"
+#include "engine/sampling/step_loop.h"
 #include "kernels/sampling.h"
 #include "runtime/device/arena.h"
 
@@ -25,7 +25,7 @@ struct Conditioning {
 // device memory of a part of a renderer, beside the weights
 struct PartBytes {
     uint64_t state = 0; // of its own
-    ArenaSize arena;    // of its programs, which run one after the other
+    ArenaSize arena;    // of its executables, which run one after the other
 
     uint64_t bytes() const { return state + arena.bytes(); }
 };
@@ -34,10 +34,10 @@ struct PartBytes {
 // timesteps and of the text, which is computed once.
 struct DenoiserTables {
     uint32_t first_rows, tokens; // first_rows: of the step table, before the plan's
-    Slot steps, clock, times, text;
+    DeviceTensor steps, clock, times, text;
 
     // declares the slots; what `plan` holds may change afterwards, its size may not
-    DenoiserTables(State& state, const Unet& unet, const SamplingPlan& plan, uint32_t rows_before,
+    DenoiserTables(TensorPool& state, const Unet& unet, const SamplingPlan& plan, uint32_t rows_before,
                    uint32_t text_tokens);
     StepTable in(Graph& g) const { return {steps.in(g), clock.in(g)}; }
     TextContext context(Graph& g) const { return {text.in(g), tokens, 0}; }
@@ -48,7 +48,7 @@ struct DenoiserTables {
                  const Conditioning& conditioning) const;
 
   private:
-    Slot timesteps_, added_, context_; // what `times` and `text` are made of
+    DeviceTensor timesteps_, added_, context_; // what `times` and `text` are made of
 };
 
 // Frames that are denoised together, one or a window of them; pixels are those of the latent.
@@ -87,8 +87,8 @@ class Denoiser {
 
     uint32_t frames() const;
     size_t steps() const { return plan_.rows.size(); }
-    size_t steps_done() const { return replay_ ? replay_->rows_done() : 0; }
-    const Program& step_program() const { return *step_; }
+    size_t steps_done() const { return loop_ ? loop_->rows_done() : 0; }
+    const Executable& step_executable() const { return *step_; }
 
   protected:
     // What stays on the device from step to step, and the graphs over it. A window's frames are images one after the
@@ -98,13 +98,13 @@ class Denoiser {
         const SamplingPlan& plan;
         uint64_t seed;
         uint32_t width, height, pixels, image_rows, frames, channels, halves; // halves: 2 with guidance
-        State state;
+        TensorPool state;
         DenoiserTables tables;
-        Slot table_row;       // of each image
-        Slot cells, known;    // of each pixel: key of its noise, and 1 where it is not to change
-        Slot x, x0;           // the state, and the prediction of the row before
-        Slot buffer, visible; // of the splat buffers
-        Slot bad;             // first_non_finite() of each frame
+        DeviceTensor table_row;       // of each image
+        DeviceTensor cells, known;    // of each pixel: key of its noise, and 1 where it is not to change
+        DeviceTensor x, x0;           // the state, and the prediction of the row before
+        DeviceTensor buffer, visible; // of the splat buffers
+        DeviceTensor bad;             // first_non_finite() of each frame
 
         struct Shape {
             LatentSize size;
@@ -113,7 +113,7 @@ class Denoiser {
         Memory(const Unet& unet, const SamplingPlan& plan, const Shape& shape, uint64_t seed);
         virtual ~Memory() = default;
         uint32_t rows() const { return frames * image_rows; }
-        Slot latent(const char* name) { return state.slot(rows(), channels, DType::f32, name); }
+        DeviceTensor latent(const char* name) { return state.tensor(rows(), channels, DType::f32, name); }
         Tensor normals(Graph& g, StepTable steps) const;
 
         virtual Graph
@@ -139,9 +139,9 @@ class Denoiser {
     Status upload_keys(const DenoiserWindow& window) const;
 
     std::unique_ptr<Memory> memory_;
-    SharedArena arena_; // of the programs
-    std::unique_ptr<Program> begin_, step_, check_;
-    std::optional<Replay> replay_;
+    SharedArena arena_; // of the executables
+    std::unique_ptr<Executable> begin_, step_, check_;
+    std::optional<StepLoop> loop_;
 };
 
 } // namespace semrover

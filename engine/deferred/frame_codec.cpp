@@ -30,9 +30,10 @@ struct FrameEncoder::Ends {
     LatentSize size;
     PictureShape picture;
     LatentScale scale;
-    State state;
-    Slot image, latent, bad; // [pixels of whole blocks, channels], [latent pixels, latent_channels], first_non_finite()
-    Slot seen, shares;       // where there are three channels: what encode_seen() takes, visible share of each block
+    TensorPool state;
+    DeviceTensor image, latent,
+        bad; // [pixels of whole blocks, channels], [latent pixels, latent_channels], first_non_finite()
+    DeviceTensor seen, shares; // where there are three channels: what encode_seen() takes, visible share of each block
 
     Ends(const Vae& v, const LatentSize& latent_size, bool unscaled)
         : vae(v), size(latent_size), picture(picture_of(size))
@@ -41,13 +42,13 @@ struct FrameEncoder::Ends {
         if (!unscaled)
             scale = {c.scaling_factor, c.shift_factor, false};
         const auto rows = [](uint32_t pixels) { return round_up(pixels, kImageRowPadding); };
-        image = state.slot(rows(picture.padded_width * picture.padded_height), c.in_channels, DType::f32, "picture");
-        latent = state.slot(rows(size.pixels()), c.latent_channels, DType::f32, "latent");
-        bad = state.slot(1, 1, DType::u32, "first number that is none", 1);
+        image = state.tensor(rows(picture.padded_width * picture.padded_height), c.in_channels, DType::f32, "picture");
+        latent = state.tensor(rows(size.pixels()), c.latent_channels, DType::f32, "latent");
+        bad = state.tensor(1, 1, DType::u32, "first number that is none", 1);
         if (c.in_channels != 3)
             return;
-        seen = state.slot(picture.width * picture.height, 1, DType::u32, "seen", 1);
-        shares = state.slot(rows(size.pixels()), 1, DType::f32, "shares", 1);
+        seen = state.tensor(picture.width * picture.height, 1, DType::u32, "seen", 1);
+        shares = state.tensor(rows(size.pixels()), 1, DType::f32, "shares", 1);
     }
     Graph graph(const DeviceLimits& limits) const
     {
@@ -95,9 +96,9 @@ Result<std::unique_ptr<FrameEncoder>> FrameEncoder::create(Device& device, const
         SR_TRY(arena, Arena::create(device, planned.arena));
     }
     e->arena_ = std::move(arena);
-    SR_TRY(e->program_, e->arena_->program(e->ends_->graph(device.limits())));
+    SR_TRY(e->executable_, e->arena_->executable(e->ends_->graph(device.limits())));
     if (e->seen().valid()) {
-        SR_TRY(e->intake_, e->arena_->program(e->ends_->intake_graph(device.limits())));
+        SR_TRY(e->intake_, e->arena_->executable(e->ends_->intake_graph(device.limits())));
     }
     return e;
 }
@@ -107,7 +108,7 @@ Result<PartBytes> FrameEncoder::planned_bytes(const DeviceLimits& limits, const 
     return Ends(vae, size, false).planned(limits);
 }
 
-const Slot& FrameEncoder::seen() const
+const DeviceTensor& FrameEncoder::seen() const
 {
     return ends_->seen;
 }
@@ -116,7 +117,7 @@ Result<EncodedBuffer> FrameEncoder::encode_seen()
 {
     SR_ASSERT(intake_, "an encoder of pictures that have not three channels");
     SR_CHECK(intake_->submit().map([](uint64_t) {}));
-    SR_CHECK(program_->submit().map([](uint64_t) {}));
+    SR_CHECK(executable_->submit().map([](uint64_t) {}));
     SR_CHECK(check());
     EncodedBuffer encoded;
     SR_TRY(encoded.latent, ends_->latent.read_rows(device_, ends_->size.pixels()));
@@ -144,7 +145,7 @@ Result<std::vector<float>> FrameEncoder::encode(std::span<const float> pixels)
             continued.insert(continued.end(), &pixels[from * channels], &pixels[from * channels] + channels);
         }
     SR_CHECK(ends_->image.write_rows(device_, continued));
-    SR_CHECK(program_->run());
+    SR_CHECK(executable_->run());
     SR_CHECK(check());
     return ends_->latent.read_rows(device_, ends_->size.pixels());
 }
@@ -154,16 +155,17 @@ struct FrameDecoder::Ends {
     LatentSize size;
     PictureShape picture;
     uint32_t frames;
-    State state;
-    Slot latents, images, bytes, bad; // bytes: of three channels; bad: first_non_finite() of each frame
+    TensorPool state;
+    DeviceTensor latents, images, bytes, bad; // bytes: of three channels; bad: first_non_finite() of each frame
 
     Ends(const Vae& v, const LatentSize& latent_size, uint32_t frame_count)
         : vae(v), size(latent_size), picture(picture_of(size)), frames(frame_count)
     {
         const VaeConfig& c = vae.config();
         const auto rows = [&](uint32_t pixels) { return frames * round_up(pixels, kImageRowPadding); };
-        latents = state.slot(rows(size.pixels()), c.latent_channels, DType::f32, "latents");
-        images = state.slot(rows(picture.padded_width * picture.padded_height), c.out_channels, DType::f32, "pictures");
+        latents = state.tensor(rows(size.pixels()), c.latent_channels, DType::f32, "latents");
+        images =
+            state.tensor(rows(picture.padded_width * picture.padded_height), c.out_channels, DType::f32, "pictures");
         bad = frame_words(state, frames, 1, "first number that is none");
         if (c.out_channels == 3)
             bytes = frame_words(state, frames, words(), "bytes");
@@ -205,7 +207,7 @@ Result<std::unique_ptr<FrameDecoder>> FrameDecoder::create(Device& device, const
         SR_TRY(arena, Arena::create(device, planned.arena));
     }
     d->arena_ = std::move(arena);
-    SR_TRY(d->program_, d->arena_->program(d->ends_->graph(device.limits())));
+    SR_TRY(d->executable_, d->arena_->executable(d->ends_->graph(device.limits())));
     return d;
 }
 
@@ -221,7 +223,7 @@ Status FrameDecoder::decode_bytes(std::span<const float> latents)
     SR_ASSERT(latents.size() == size_t(e.frames) * e.size.pixels() * e.latents.cols(), "{} numbers to decode",
               latents.size());
     SR_CHECK(write_frames(device_, e.latents, e.frames, latents));
-    SR_CHECK(program_->run());
+    SR_CHECK(executable_->run());
     return check_frame_words(device_, e.bad, e.images, e.frames, e.picture,
                              e.frames == 1 ? "the decoded frame" : "the decoded video");
 }
@@ -240,7 +242,7 @@ Result<std::vector<float>> FrameDecoder::decode(std::span<const float> latents)
     return images;
 }
 
-Slot FrameDecoder::bytes(uint32_t frame) const
+DeviceTensor FrameDecoder::bytes(uint32_t frame) const
 {
     SR_ASSERT(ends_->bytes.valid(), "bytes of pictures of {} channels", ends_->images.cols());
     return words_of_frame(ends_->bytes, ends_->frames, frame, ends_->words());

@@ -27,7 +27,7 @@ class FrameEncoder {
     Result<std::vector<float>> encode(std::span<const float> image);
 
     // the same of pixels on the device, [image pixels] u32 as splat_pixels() makes them: the caller fills seen()
-    const Slot& seen() const;
+    const DeviceTensor& seen() const;
     Result<EncodedBuffer> encode_seen();
 
   private:
@@ -37,8 +37,8 @@ class FrameEncoder {
 
     Device& device_;
     std::unique_ptr<Ends> ends_;
-    SharedArena arena_;                         // of the programs
-    std::unique_ptr<Program> intake_, program_; // intake: of what was seen
+    SharedArena arena_;                               // of the executables
+    std::unique_ptr<Executable> intake_, executable_; // intake: of what was seen
 
   public:
     ~FrameEncoder();
@@ -60,7 +60,7 @@ class FrameDecoder {
     // The same to bytes on the device, where there are three channels. What bytes() shows of a frame - red, green,
     // blue, four bytes a word - is good until the next call.
     Status decode_bytes(std::span<const float> latents);
-    Slot bytes(uint32_t frame) const;
+    DeviceTensor bytes(uint32_t frame) const;
 
   private:
     struct Ends;
@@ -68,8 +68,8 @@ class FrameDecoder {
 
     Device& device_;
     std::unique_ptr<Ends> ends_;
-    SharedArena arena_; // of the program
-    std::unique_ptr<Program> program_;
+    SharedArena arena_; // of the executable
+    std::unique_ptr<Executable> executable_;
 
   public:
     ~FrameDecoder();

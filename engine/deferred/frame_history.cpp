@@ -24,12 +24,12 @@ std::vector<float> metres_of(const DepthPicture& depth)
 FrameHistory::Memory::Memory(const LatentSize& latent_size) : size(latent_size)
 {
     const uint32_t pixels = size.image_width * size.image_height;
-    const auto words = [&](uint32_t count, const char* name) { return state.slot(count, 1, DType::u32, name, 1); };
+    const auto words = [&](uint32_t count, const char* name) { return state.tensor(count, 1, DType::u32, name, 1); };
     const auto bytes = [&](const char* name) {
         return words(picture_words(size.image_width, size.image_height), name);
     };
-    cameras = state.slot(2, kLensCameraFloats, DType::f32, "cameras", kLensCameraFloats);
-    const auto depths = [&](const char* name) { return state.slot(pixels, 1, DType::f32, name, 1); };
+    cameras = state.tensor(2, kLensCameraFloats, DType::f32, "cameras", kLensCameraFloats);
+    const auto depths = [&](const char* name) { return state.tensor(pixels, 1, DType::f32, name, 1); };
     now = {bytes("frame"), depths("depth")};
     past = {bytes("frame before"), depths("depth before")};
     made = bytes("accumulated frame");
@@ -58,9 +58,9 @@ Result<std::unique_ptr<FrameHistory>> FrameHistory::create(Device& device, const
 
 Status FrameHistory::use_lens(CameraModel model, bool moving)
 {
-    if (program_ && model_ == model && moving_ == moving)
+    if (executable_ && model_ == model && moving_ == moving)
         return {};
-    SR_TRY(program_, Program::create(device_, memory_.graph(device_.limits(), lens_of(model), moving, share_)));
+    SR_TRY(executable_, Executable::create(device_, memory_.graph(device_.limits(), lens_of(model), moving, share_)));
     model_ = model;
     moving_ = moving;
     return {};
@@ -71,12 +71,12 @@ uint64_t FrameHistory::planned_bytes(const DeviceLimits& limits, const LatentSiz
     return Memory(size).state.planned_bytes(limits);
 }
 
-Status FrameHistory::copy(const Slot& from, const Slot& to)
+Status FrameHistory::copy(const DeviceTensor& from, const DeviceTensor& to)
 {
     return copies_->copy(from, to).map([](uint64_t) {});
 }
 
-Status FrameHistory::add(const Slot& bytes, const CameraFrame& camera, const DepthPicture& depth)
+Status FrameHistory::add(const DeviceTensor& bytes, const CameraFrame& camera, const DepthPicture& depth)
 {
     SR_CHECK(copy(bytes, memory_.now.bytes));
     return accumulate_now(camera, depth);
@@ -112,7 +112,7 @@ Status FrameHistory::accumulate_now(const CameraFrame& camera, const DepthPictur
     if (alone)
         return copy(memory_.now.bytes, memory_.made);
     SR_CHECK(use_lens(pair.model, pair.moving));
-    return program_->run();
+    return executable_->run();
 }
 
 Status FrameHistory::restore(std::span<const uint8_t> pixels, const CameraFrame& camera, const DepthPicture& depth)

@@ -7,7 +7,7 @@
 #include "engine/format/depth_picture.h"
 #include "kernels/splat.h"
 #include "runtime/device/copy_ring.h"
-#include "runtime/device/program.h"
+#include "runtime/device/executable.h"
 
 namespace semrover {
 
@@ -22,13 +22,13 @@ class FrameHistory {
 
     // The next frame of the chain. The first one stays as it is, and so does one through another lens than the frame
     // before. bytes: as picture_bytes() makes them, pixels: [height, width, 3]; depth: nothing is infinitely far away
-    Status add(const Slot& bytes, const CameraFrame& camera, const DepthPicture& depth);
+    Status add(const DeviceTensor& bytes, const CameraFrame& camera, const DepthPicture& depth);
     Status add(std::span<const uint8_t> pixels, const CameraFrame& camera, const DepthPicture& depth);
     void restart() { frames_ = 0; } // the next frame has none before it
     // a frame that was accumulated before: what comes next goes on from it
     Status restore(std::span<const uint8_t> pixels, const CameraFrame& camera, const DepthPicture& depth);
 
-    const Slot& frame() const
+    const DeviceTensor& frame() const
     {
         return memory_.made;
     } // [picture_words()] u32, of the last one, until the next is added
@@ -38,13 +38,13 @@ class FrameHistory {
 
   private:
     struct Frame {
-        Slot bytes, depth;
+        DeviceTensor bytes, depth;
     };
     // memory that is declared, and the graph over it
     struct Memory {
         LatentSize size;
-        State state;
-        Slot cameras, made;
+        TensorPool state;
+        DeviceTensor cameras, made;
         Frame now, past;
 
         explicit Memory(const LatentSize& size);
@@ -52,16 +52,16 @@ class FrameHistory {
     };
     FrameHistory(Device& device, const LatentSize& size, float share) : device_(device), memory_(size), share_(share) {}
     Status use_lens(CameraModel model, bool moving);
-    Status copy(const Slot& from, const Slot& to);
+    Status copy(const DeviceTensor& from, const DeviceTensor& to);
     Status write_pixels(std::span<const uint8_t> pixels);
     Status accumulate_now(const CameraFrame& camera, const DepthPicture& depth);
 
     Device& device_;
     Memory memory_;
     float share_;
-    CameraModel model_ = CameraModel::pinhole; // of the program
+    CameraModel model_ = CameraModel::pinhole; // of the executable
     bool moving_ = false;                      // likewise
-    std::unique_ptr<Program> program_;
+    std::unique_ptr<Executable> executable_;
     std::unique_ptr<CopyRing> copies_;
     CameraFrame camera_; // of the last frame
     uint32_t frames_ = 0;

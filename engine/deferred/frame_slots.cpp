@@ -11,13 +11,13 @@ constexpr uint32_t kWordPadding = 64;
 
 } // namespace
 
-Slot frame_of(const Slot& slot, uint32_t frames, uint32_t number)
+DeviceTensor frame_of(const DeviceTensor& slot, uint32_t frames, uint32_t number)
 {
     const uint32_t rows = slot.rows() / frames;
     return slot.row_range(number * rows, rows);
 }
 
-Status write_frames(Device& device, const Slot& slot, uint32_t frames, std::span<const float> values)
+Status write_frames(Device& device, const DeviceTensor& slot, uint32_t frames, std::span<const float> values)
 {
     const size_t size = values.size() / frames;
     SR_ASSERT(values.size() == frames * size && size % slot.cols() == 0, "{} numbers for {} frames of '{}'",
@@ -27,7 +27,7 @@ Status write_frames(Device& device, const Slot& slot, uint32_t frames, std::span
     return {};
 }
 
-Result<std::vector<float>> read_frames(Device& device, const Slot& slot, uint32_t frames, uint32_t pixels)
+Result<std::vector<float>> read_frames(Device& device, const DeviceTensor& slot, uint32_t frames, uint32_t pixels)
 {
     std::vector<float> values;
     values.reserve(size_t(frames) * pixels * slot.cols());
@@ -38,17 +38,18 @@ Result<std::vector<float>> read_frames(Device& device, const Slot& slot, uint32_
     return values;
 }
 
-Slot frame_words(State& state, uint32_t frames, uint32_t count, std::string_view name)
+DeviceTensor frame_words(TensorPool& state, uint32_t frames, uint32_t count, std::string_view name)
 {
-    return state.slot(frames * round_up(count, kWordPadding), 1, DType::u32, name, 1);
+    return state.tensor(frames * round_up(count, kWordPadding), 1, DType::u32, name, 1);
 }
 
-Slot words_of_frame(const Slot& words, uint32_t frames, uint32_t number, uint32_t count)
+DeviceTensor words_of_frame(const DeviceTensor& words, uint32_t frames, uint32_t number, uint32_t count)
 {
     return words.row_range(number * (words.rows() / frames), count);
 }
 
-void check_frames(Graph& g, const Slot& values, uint32_t frames, const PictureShape& shape, const Slot& words)
+void check_frames(Graph& g, const DeviceTensor& values, uint32_t frames, const PictureShape& shape,
+                  const DeviceTensor& words)
 {
     const Tensor all = values.in(g);
     const uint32_t rows = values.rows() / frames;
@@ -56,7 +57,7 @@ void check_frames(Graph& g, const Slot& values, uint32_t frames, const PictureSh
         g.keep(first_non_finite(g, all.row_range(f * rows, rows), shape), words_of_frame(words, frames, f, 1));
 }
 
-Status check_frame_words(Device& device, const Slot& words, const Slot& values, uint32_t frames,
+Status check_frame_words(Device& device, const DeviceTensor& words, const DeviceTensor& values, uint32_t frames,
                          const PictureShape& shape, std::string_view what)
 {
     SR_TRY(const std::vector<uint32_t> all, words.read<uint32_t>(device));

@@ -26,24 +26,24 @@ uint32_t video_halves(const VsdOptions& o)
 
 struct VsdRenderer::WindowMemory : Denoiser::Memory {
     const VsdOptions& options;
-    Slot numbers, frame_table, frame_row; // of the frames; the table is computed once; row of it of each image
-    Slot first, fixed;                    // noise of the first state; latents of the known frames
-    Slot weights;                         // known_frame_weights(), where they are carried
-    Slot velocity;                        // of every half, where they are apart
+    DeviceTensor numbers, frame_table, frame_row; // of the frames; the table is computed once; row of it of each image
+    DeviceTensor first, fixed;                    // noise of the first state; latents of the known frames
+    DeviceTensor weights;                         // known_frame_weights(), where they are carried
+    DeviceTensor velocity;                        // of every half, where they are apart
 
     WindowMemory(const Unet& u, const SamplingPlan& p, uint32_t text_tokens, const LatentSize& size, uint32_t count,
                  const VsdOptions& o)
         : Memory(u, p, {size, count, video_halves(o), kFirstRows, text_tokens}, o.seed), options(o)
     {
-        numbers = state.slot(frames, 1, DType::f32, "frame numbers", 1);
-        frame_table = state.slot(frames, unet.frame_width(), DType::f32, "frames");
-        frame_row = state.slot(halves * frames, 1, DType::u32, "frame_row", 1);
+        numbers = state.tensor(frames, 1, DType::f32, "frame numbers", 1);
+        frame_table = state.tensor(frames, unet.frame_width(), DType::f32, "frames");
+        frame_row = state.tensor(halves * frames, 1, DType::u32, "frame_row", 1);
         first = latent("first noise");
         fixed = latent("known frames");
         if (o.correlation > 0)
-            weights = state.slot(uint32_t(p.rows.size()) * frames, frames, DType::f32, "weights", frames);
+            weights = state.tensor(uint32_t(p.rows.size()) * frames, frames, DType::f32, "weights", frames);
         if (apart())
-            velocity = state.slot(halves * rows(), channels, DType::f32, "velocity");
+            velocity = state.tensor(halves * rows(), channels, DType::f32, "velocity");
     }
     bool apart() const { return options.halves_apart && halves > 1; }
 

@@ -69,8 +69,8 @@ Result<FrameBatch> FrameBatch::create(Device& device, const DepthFrames& frames)
         return fail(ErrorCode::out_of_memory, "a frame of {} pixels; this device has room for {}", largest, limit);
     FrameBatch batch(device);
     const auto pixels = uint32_t(std::min({std::max(largest, kMaxPixels), std::max(largest, all), limit}));
-    batch.table_ = batch.state_.slot(kMaxFrames, kTsdfFrameWords, DType::f32, "frames", kTsdfFrameWords);
-    batch.pixels_ = batch.state_.slot(pixels, 2, DType::u32, "pixels", 2);
+    batch.table_ = batch.state_.tensor(kMaxFrames, kTsdfFrameWords, DType::f32, "frames", kTsdfFrameWords);
+    batch.pixels_ = batch.state_.tensor(pixels, 2, DType::u32, "pixels", 2);
     SR_CHECK(batch.state_.allocate(device, "frames to fuse"));
     SR_CHECK(batch.pixels_.clear(device));
     return batch;

@@ -4,7 +4,7 @@
 
 #include "engine/mesh/mesh.h"
 #include "engine/scene/palette.h"
-#include "runtime/device/program.h"
+#include "runtime/device/executable.h"
 
 #include <algorithm>
 #include <bit>
@@ -26,15 +26,16 @@ class Extraction {
   private:
     uint32_t blocks() const { return uint32_t(volume_.blocks().size()); }
     MarchingCubesCounts counts_in(Graph& g) const;
-    Result<std::vector<uint32_t>> starts(const Slot& first, const Slot& total) const; // of blocks, and the total
+    Result<std::vector<uint32_t>> starts(const DeviceTensor& first,
+                                         const DeviceTensor& total) const; // of blocks, and the total
     uint32_t range_end(uint32_t first, uint64_t bytes) const;
     Status write_range(uint32_t first, uint32_t last, FusedSurface& surface);
     void append(uint32_t first, uint32_t last, std::span<const std::array<float, 4>> rows, FusedSurface& surface) const;
 
     Device& device_;
     const TsdfVolume& volume_;
-    State state_;
-    Slot table_, cases_, edges_, first_vertex_, first_face_, vertices_, faces_;
+    TensorPool state_;
+    DeviceTensor table_, cases_, edges_, first_vertex_, first_face_, vertices_, faces_;
     std::vector<uint32_t> vertex_starts_, face_starts_; // [blocks + 1]
 };
 
@@ -43,7 +44,7 @@ MarchingCubesCounts Extraction::counts_in(Graph& g) const
     return {cases_.in(g), edges_.in(g), first_vertex_.in(g), first_face_.in(g), vertices_.in(g), faces_.in(g)};
 }
 
-Result<std::vector<uint32_t>> Extraction::starts(const Slot& first, const Slot& total) const
+Result<std::vector<uint32_t>> Extraction::starts(const DeviceTensor& first, const DeviceTensor& total) const
 {
     SR_TRY(std::vector<uint32_t> values, first.read<uint32_t>(device_));
     SR_TRY(const std::vector<uint32_t> all, total.read<uint32_t>(device_));
@@ -56,7 +57,7 @@ Result<std::vector<uint32_t>> Extraction::starts(const Slot& first, const Slot& 
 Status Extraction::count()
 {
     const std::vector<uint32_t> table = marching_cubes_table();
-    const auto array = [&](uint32_t rows, const char* name) { return state_.slot(rows, 1, DType::u32, name, 1); };
+    const auto array = [&](uint32_t rows, const char* name) { return state_.tensor(rows, 1, DType::u32, name, 1); };
     const uint32_t voxels = blocks() * kTsdfBlockVoxels;
     table_ = array(uint32_t(table.size()), "table");
     cases_ = array(voxels, "cases");
@@ -69,8 +70,8 @@ Status Extraction::count()
     SR_CHECK(table_.write(device_, table));
     Graph g(device_.limits());
     marching_cubes_count(g, volume_.in(g), table_.in(g), counts_in(g));
-    SR_TRY(const auto program, Program::create(device_, g));
-    SR_CHECK(program->run());
+    SR_TRY(const auto executable, Executable::create(device_, g));
+    SR_CHECK(executable->run());
     SR_TRY(vertex_starts_, starts(first_vertex_, vertices_));
     SR_TRY(face_starts_, starts(first_face_, faces_));
     return {};
@@ -103,17 +104,17 @@ Status Extraction::write_range(uint32_t first, uint32_t last, FusedSurface& surf
     const MarchingCubesRange range{first, last - first, vertex_starts_[first], face_starts_[first]};
     // a block may have faces whose vertices are its neighbours' only
     const uint32_t vertices = vertex_starts_[last] - range.first_vertex, faces = face_starts_[last] - range.first_face;
-    State out;
-    const Slot positions = out.slot(std::max(vertices, 1u), 4, DType::f32, "vertices", 4);
-    const Slot corners = out.slot(std::max(faces, 1u), 3, DType::u32, "faces", 3);
+    TensorPool out;
+    const DeviceTensor positions = out.tensor(std::max(vertices, 1u), 4, DType::f32, "vertices", 4);
+    const DeviceTensor corners = out.tensor(std::max(faces, 1u), 3, DType::u32, "faces", 3);
     SR_CHECK(out.allocate(device_, "surface"));
     Graph g(device_.limits());
     const MarchingCubesField field = volume_.in(g);
     const MarchingCubesCounts counts = counts_in(g);
     marching_cubes_vertices(g, field, counts, range, positions.in(g));
     marching_cubes_faces(g, field, counts, table_.in(g), range, corners.in(g));
-    SR_TRY(const auto program, Program::create(device_, g));
-    SR_CHECK(program->run());
+    SR_TRY(const auto executable, Executable::create(device_, g));
+    SR_CHECK(executable->run());
     using Row = std::array<float, 4>;
     SR_TRY(const std::vector<Row> rows, positions.row_range(0, vertices).read<Row>(device_));
     append(first, last, rows, surface);

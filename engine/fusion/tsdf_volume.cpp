@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/fusion/tsdf_volume.h"
 
-#include "runtime/device/program.h"
+#include "runtime/device/executable.h"
 
 #include <algorithm>
 #include <cmath>
@@ -127,21 +127,21 @@ Status TsdfVolume::plan_box(const DepthFrames& frames)
 Status TsdfVolume::touch(const DepthFrames& frames, FrameBatch& batch, const FusionProgress& progress)
 {
     const TsdfOptions options = kernel_options();
-    bitmap_ = box_state_.slot(options.bitmap_words(), 1, DType::u32, "bitmap", 1);
-    ranks_ = box_state_.slot(options.bitmap_words(), 1, DType::u32, "ranks", 1);
-    total_ = box_state_.slot(1, 1, DType::u32, "blocks", 1);
+    bitmap_ = box_state_.tensor(options.bitmap_words(), 1, DType::u32, "bitmap", 1);
+    ranks_ = box_state_.tensor(options.bitmap_words(), 1, DType::u32, "ranks", 1);
+    total_ = box_state_.tensor(1, 1, DType::u32, "blocks", 1);
     SR_CHECK(box_state_.allocate(*device_, "blocks of the box"));
     SR_CHECK(bitmap_.clear(*device_));
     Graph g(device_->limits());
     const TsdfFrames table = batch.in(g);
     tsdf_touch(g, table.frames, tsdf_planes(g, table, options), options, bitmap_.in(g));
-    SR_TRY(const auto program, Program::create(*device_, g));
+    SR_TRY(const auto executable, Executable::create(*device_, g));
     std::vector<uint32_t> order(frames.cameras.size());
     std::iota(order.begin(), order.end(), 0u);
     for (size_t next = 0; next < order.size();) {
         const size_t count = batch.fitting(frames, order, next);
         SR_CHECK(batch.upload(frames, box_, std::span(order).subspan(next, count), options_.excluded));
-        SR_CHECK(program->run());
+        SR_CHECK(executable->run());
         next += count;
         SR_CHECK(report(progress, "find surface", next, order.size()));
     }
@@ -154,8 +154,8 @@ Status TsdfVolume::list_blocks()
     const PrefixSum ranked = tsdf_rank(count, bitmap_.in(count));
     count.keep(ranked.sums, ranks_);
     count.keep(ranked.total, total_);
-    SR_TRY(auto program, Program::create(*device_, count));
-    SR_CHECK(program->run());
+    SR_TRY(auto executable, Executable::create(*device_, count));
+    SR_CHECK(executable->run());
     SR_TRY(const std::vector<uint32_t> total, total_.read<uint32_t>(*device_));
     const uint32_t blocks = total.front();
     if (blocks == 0)
@@ -170,14 +170,14 @@ Status TsdfVolume::list_blocks()
                     "the surface fills {} blocks of 8^3 voxels; this device has room for {}: fuse parts of the path, "
                     "or use a larger `voxel` or a smaller `max_depth`",
                     blocks, most);
-    block_ids_ = field_.slot(blocks, 1, DType::u32, "blocks", 1);
-    distances_ = field_.slot(blocks * kTsdfBlockVoxels, 1, DType::f32, "distances", 1);
-    attributes_ = field_.slot(blocks * kTsdfBlockVoxels, 1, DType::u32, "attributes", 1);
+    block_ids_ = field_.tensor(blocks, 1, DType::u32, "blocks", 1);
+    distances_ = field_.tensor(blocks * kTsdfBlockVoxels, 1, DType::f32, "distances", 1);
+    attributes_ = field_.tensor(blocks * kTsdfBlockVoxels, 1, DType::u32, "attributes", 1);
     SR_CHECK(field_.allocate(*device_, "distance field"));
     Graph g(device_->limits());
     tsdf_list(g, bitmap_.in(g), ranks_.in(g), block_ids_.in(g));
-    SR_TRY(program, Program::create(*device_, g));
-    SR_CHECK(program->run());
+    SR_TRY(executable, Executable::create(*device_, g));
+    SR_CHECK(executable->run());
     SR_TRY(blocks_, block_ids_.read<uint32_t>(*device_));
     return {};
 }
@@ -206,13 +206,13 @@ Result<uint32_t> TsdfVolume::chunk_blocks(const FrameBatch& batch) const
 }
 
 struct TsdfVolume::ChunkState {
-    State memory;
-    Slot blocks, sums, votes;
+    TensorPool memory;
+    DeviceTensor blocks, sums, votes;
 
     explicit ChunkState(uint32_t most)
-        : blocks(memory.slot(most, 1, DType::u32, "blocks", 1)),
-          sums(memory.slot(most * kTsdfBlockVoxels * kTsdfStateFields, 1, DType::f32, "sums", 1)),
-          votes(memory.slot(most * kTsdfBlockVoxels * kTsdfVoteWords, 1, DType::u32, "votes", 1))
+        : blocks(memory.tensor(most, 1, DType::u32, "blocks", 1)),
+          sums(memory.tensor(most * kTsdfBlockVoxels * kTsdfStateFields, 1, DType::f32, "sums", 1)),
+          votes(memory.tensor(most * kTsdfBlockVoxels * kTsdfVoteWords, 1, DType::u32, "votes", 1))
     {
     }
     // of the first `count` blocks
@@ -249,7 +249,7 @@ Status TsdfVolume::integrate_chunk(const DepthFrames& frames, FrameBatch& batch,
     Graph g(device_->limits());
     const TsdfFrames table = batch.in(g);
     tsdf_integrate(g, table.frames, tsdf_planes(g, table, options), options, state.in(g, count));
-    SR_TRY(auto program, Program::create(*device_, g));
+    SR_TRY(auto executable, Executable::create(*device_, g));
     SR_CHECK(state.sums.clear(*device_));
     SR_CHECK(state.votes.clear(*device_));
     SR_CHECK(state.blocks.row_range(0, count).write(*device_, std::span(blocks_).subspan(first, count)));
@@ -257,15 +257,15 @@ Status TsdfVolume::integrate_chunk(const DepthFrames& frames, FrameBatch& batch,
     for (size_t next = 0; next < order.size();) {
         const size_t fitting = batch.fitting(frames, order, next);
         SR_CHECK(batch.upload(frames, box_, std::span(order).subspan(next, fitting), options_.excluded));
-        SR_CHECK(program->run());
+        SR_CHECK(executable->run());
         next += fitting;
         SR_CHECK(added(order[next - 1] + 1));
     }
     Graph finish(device_->limits());
     tsdf_finish(finish, state.in(finish, count), options, distances_.row_range(at, voxels).in(finish),
                 attributes_.row_range(at, voxels).in(finish));
-    SR_TRY(program, Program::create(*device_, finish));
-    return program->run();
+    SR_TRY(executable, Executable::create(*device_, finish));
+    return executable->run();
 }
 
 // frames that may see one of these blocks, in order

@@ -7,7 +7,7 @@
 #include "kernels/network.h"
 #include "runtime/base/result.h"
 #include "runtime/device/device.h"
-#include "runtime/device/state.h"
+#include "runtime/device/tensor_pool.h"
 
 #include <cstdint>
 #include <functional>
@@ -57,8 +57,8 @@ class FrameBatch {
     explicit FrameBatch(Device& device) : device_(&device) {}
 
     Device* device_;
-    State state_;
-    Slot table_, pixels_;
+    TensorPool state_;
+    DeviceTensor table_, pixels_;
 };
 
 // The truncated signed distance of depth images, in sparse blocks of 8^3 voxels in device memory. Distances are taken
@@ -99,9 +99,9 @@ class TsdfVolume {
         std::array<int64_t, 3> low, high;
     };
     std::vector<Reach> reach_; // of each frame
-    State box_state_, field_;
-    Slot bitmap_, ranks_, total_;             // of the box
-    Slot block_ids_, distances_, attributes_; // of the field
+    TensorPool box_state_, field_;
+    DeviceTensor bitmap_, ranks_, total_;             // of the box
+    DeviceTensor block_ids_, distances_, attributes_; // of the field
     std::vector<uint32_t> blocks_;
     uint32_t chunks_ = 0;
 };

@@ -56,15 +56,15 @@ Status FlowDrawing::allocate(Camera& c, uint32_t pixels)
 {
     c = Camera();
     for (View& view : c.views) {
-        view.depth = c.state.slot(pixels, 2, DType::f32, "depth of a frame", 2);
-        view.owners = c.state.slot(pixels, 1, DType::u32, "owners of a frame", 1);
+        view.depth = c.state.tensor(pixels, 2, DType::f32, "depth of a frame", 2);
+        view.owners = c.state.tensor(pixels, 1, DType::u32, "owners of a frame", 1);
     }
-    c.cameras = c.state.slot(2, kLensCameraFloats, DType::f32, "cameras", kLensCameraFloats);
-    c.moves = c.state.slot(1 + actors_.size(), 12, DType::f32, "moves", 12);
+    c.cameras = c.state.tensor(2, kLensCameraFloats, DType::f32, "cameras", kLensCameraFloats);
+    c.moves = c.state.tensor(1 + actors_.size(), 12, DType::f32, "moves", 12);
     if (actors_.size())
-        c.rows = c.state.slot(uint32_t(actors_.rows().size()), 1, DType::u32, "rows of movers", 1);
-    c.flow = c.state.slot(pixels, 2, DType::f32, "flow", 2);
-    c.flow_states = c.state.slot(pixels, 1, DType::u32, "flow states", 1);
+        c.rows = c.state.tensor(uint32_t(actors_.rows().size()), 1, DType::u32, "rows of movers", 1);
+    c.flow = c.state.tensor(pixels, 2, DType::f32, "flow", 2);
+    c.flow_states = c.state.tensor(pixels, 1, DType::u32, "flow states", 1);
     return c.state.allocate(device_, "flow");
 }
 
@@ -82,7 +82,7 @@ Status FlowDrawing::compile(Camera& c, const CameraPair& pair, const ImageSize& 
             splat_flow(g, c.cameras.in(g), moves, {now.depth.in(g), now.owners.in(g)}, next.depth.in(g), options);
         g.keep(y.flow, c.flow);
         g.keep(y.states, c.flow_states);
-        SR_TRY(c.programs[from], Program::create(device_, g));
+        SR_TRY(c.executables[from], Executable::create(device_, g));
     }
     return {};
 }
@@ -110,7 +110,7 @@ Result<FlowSlots> FlowDrawing::flow(const CameraFrame& now, const CameraFrame& n
         c.rows.rows() != actors_.rows().size())
         SR_CHECK(allocate(c, size.width * size.height));
     const CameraPair pair = pair_of(now, next);
-    if (!c.programs[1] || c.model != pair.model || c.moving != pair.moving)
+    if (!c.executables[1] || c.model != pair.model || c.moving != pair.moving)
         SR_CHECK(compile(c, pair, size));
     const size_t from = c.views[1].of == place_of(now); // it was the next one the last time
     SR_CHECK(draw(now, c.views[from]));
@@ -119,7 +119,7 @@ Result<FlowSlots> FlowDrawing::flow(const CameraFrame& now, const CameraFrame& n
     SR_CHECK(c.moves.write(device_, actors_.moves(now, next)));
     if (c.rows.valid())
         SR_CHECK(c.rows.write(device_, actors_.rows()));
-    SR_CHECK(c.programs[from]->run());
+    SR_CHECK(c.executables[from]->run());
     return FlowSlots{c.flow, c.flow_states};
 }
 

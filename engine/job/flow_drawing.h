@@ -13,7 +13,7 @@ namespace semrover {
 
 // optical flow from a frame to the next one of its camera, as FlowTensors (kernels/picture.h) has it
 struct FlowSlots {
-    Slot flow, states;
+    DeviceTensor flow, states;
 };
 
 // For each frame of a path the next one of its camera, to which there is flow; the number of frames where there is
@@ -35,21 +35,21 @@ class FlowDrawing {
     // and size. Errors: out_of_memory; device errors
     Result<FlowSlots> flow(const CameraFrame& now, const CameraFrame& next);
     void forget();                                     // what was drawn: the scene is another one
-    size_t cameras() const { return cameras_.size(); } // that it has memory and programs for, by name
+    size_t cameras() const { return cameras_.size(); } // that it has memory and executables for, by name
 
   private:
     using Place = std::pair<double, Rigid>; // time and pose
     struct View {
-        Slot depth, owners;
+        DeviceTensor depth, owners;
         std::optional<Place> of; // the frame that it has
     };
     struct Camera {
-        State state;
+        TensorPool state;
         std::array<View, 2> views;
-        Slot cameras, moves, rows, flow, flow_states;
-        CameraModel model = CameraModel::pinhole; // that the programs are for
+        DeviceTensor cameras, moves, rows, flow, flow_states;
+        CameraModel model = CameraModel::pinhole; // that the executables are for
         bool moving = false;
-        std::array<std::unique_ptr<Program>, 2> programs; // from each view to the other
+        std::array<std::unique_ptr<Executable>, 2> executables; // from each view to the other
     };
     Status allocate(Camera& camera, uint32_t pixels);
     Status compile(Camera& camera, const CameraPair& pair, const ImageSize& size);

@@ -19,7 +19,7 @@ class Outgoing {
     static uint64_t planned_bytes(const DeviceLimits& limits, uint64_t bytes); // of device memory
 
     // `sink` is called on the thread of a later call here
-    Status read(const Slot& slot, ReadbackRing::Sink sink) { return ring_->read(slot, std::move(sink)); }
+    Status read(const DeviceTensor& slot, ReadbackRing::Sink sink) { return ring_->read(slot, std::move(sink)); }
     Status read(const FrameSlots& slots, const ImageSize& size, std::function<Status(FramePixels)> sink);
     // bytes: of host memory that `file` holds
     Status write(uint64_t bytes, FileQueue::Make file) { return files_.push(bytes, std::move(file)); }

@@ -102,7 +102,7 @@ Result<ImageRgb8> RefineStore::load_frame(const BufferCamera& camera, uint32_t f
     return read_image_rgb8(path(PieceKind::frame, camera, frame));
 }
 
-void RefineFiles::give_buffer(const std::string& camera, uint32_t frame, const Slot& seen)
+void RefineFiles::give_buffer(const std::string& camera, uint32_t frame, const DeviceTensor& seen)
 {
     Given& given = given_[camera];
     given.seen = seen;
@@ -125,7 +125,7 @@ bool RefineFiles::waits_for(const FrameTask& task) const
     return given == given_.end() || given->second.buffers <= task.frame();
 }
 
-Status RefineFiles::read_seen(const CameraChain& chain, uint32_t frame, const Slot& to)
+Status RefineFiles::read_seen(const CameraChain& chain, uint32_t frame, const DeviceTensor& to)
 {
     if (!drawn_) {
         SR_TRY(const BufferFrame buffer, read_buffer(camera_of(chain).buffers, frame));
@@ -156,7 +156,7 @@ Result<FrameView> RefineFiles::view(const CameraChain& chain, uint32_t frame)
     return FrameView{c.cameras[frame], std::move(depth)};
 }
 
-Status RefineFiles::save_frame(const CameraChain& chain, uint32_t frame, const Slot& pixels)
+Status RefineFiles::save_frame(const CameraChain& chain, uint32_t frame, const DeviceTensor& pixels)
 {
     return out_.read(pixels, [this, &c = camera_of(chain), frame](std::span<const std::byte> read) {
         const auto* first = reinterpret_cast<const uint8_t*>(read.data());

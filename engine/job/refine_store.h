@@ -67,13 +67,13 @@ class RefineFiles : public FrameStore {
 
     // A buffer of a camera, in order from the first frame on. Its pixels (SplatPixelSlots::seen) stay until the next
     // one's; its depth may come later.
-    void give_buffer(const std::string& camera, uint32_t frame, const Slot& seen);
+    void give_buffer(const std::string& camera, uint32_t frame, const DeviceTensor& seen);
     void give_depth(const std::string& camera, uint32_t frame, DepthPicture depth);
     bool waits_for(const FrameTask& task) const; // a buffer of it that was not given yet
 
-    Status read_seen(const CameraChain& chain, uint32_t frame, const Slot& to) override;
+    Status read_seen(const CameraChain& chain, uint32_t frame, const DeviceTensor& to) override;
     Result<FrameView> view(const CameraChain& chain, uint32_t frame) override;
-    Status save_frame(const CameraChain& chain, uint32_t frame, const Slot& pixels) override;
+    Status save_frame(const CameraChain& chain, uint32_t frame, const DeviceTensor& pixels) override;
     Status save_latent(const CameraChain& chain, uint32_t frame, const std::vector<float>& latent) override;
     bool keeps_encoded() const override { return true; }
     Status save_encoded(const CameraChain& chain, uint32_t frame, std::vector<float> latent) override;
@@ -83,7 +83,7 @@ class RefineFiles : public FrameStore {
 
   private:
     struct Given {
-        Slot seen;                               // of the last buffer that was given
+        DeviceTensor seen;                       // of the last buffer that was given
         uint32_t buffers = 0;                    // so far
         std::map<uint32_t, DepthPicture> latest; // depths, whether given or read
     };

@@ -52,8 +52,8 @@ uint64_t history_bytes(const Device& device, const Refinement& r)
 struct BufferDrawing {
     DrawnScene scene;
     PathDrawing drawing;
-    State state;
-    std::map<std::string, Slot> seen; // SplatPixelSlots::seen of each camera's last frame
+    TensorPool state;
+    std::map<std::string, DeviceTensor> seen; // SplatPixelSlots::seen of each camera's last frame
     std::unique_ptr<CopyRing> copies;
     std::map<std::string, uint32_t> counts; // frames so far, per camera
     EmptyFrames empty;
@@ -67,7 +67,7 @@ struct BufferDrawing {
         empty.set_scene(bounds);
         for (const RefinedCamera& c : r.cameras)
             seen[c.name] =
-                state.slot(c.size().image_width * c.size().image_height, 1, DType::u32, "seen of a camera", 1);
+                state.tensor(c.size().image_width * c.size().image_height, 1, DType::u32, "seen of a camera", 1);
     }
     Status allocate(Device& device)
     {

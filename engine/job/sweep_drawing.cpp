@@ -107,7 +107,7 @@ Result<SweepImage> SweepDrawing::render(const LidarSweep& sweep)
     SweepImage seen = image();
     SR_CHECK(draw(sweep, [&](uint32_t part, SplatSlots slots) -> Status {
         std::vector<BufferSlice> slices;
-        for (const Slot* slot : slots.all())
+        for (const DeviceTensor* slot : slots.all())
             slices.push_back(slot->slice());
         std::vector<std::vector<std::byte>> bytes(slices.size());
         SR_CHECK(device_.read(slices, [&](const ReadPiece& piece) {

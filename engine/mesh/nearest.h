@@ -4,7 +4,7 @@
 
 #include "engine/mesh/mesh.h"
 #include "runtime/device/device.h"
-#include "runtime/device/state.h"
+#include "runtime/device/tensor_pool.h"
 
 #include <array>
 #include <cstdint>
@@ -46,8 +46,8 @@ class NearestSurface {
 
   private:
     struct Tree { // as many faces as the device can bind
-        State state;
-        Slot nodes, triangles;
+        TensorPool state;
+        DeviceTensor nodes, triangles;
     };
 
     explicit NearestSurface(Device& device) : device_(&device) {}

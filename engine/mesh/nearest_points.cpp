@@ -4,8 +4,8 @@
 
 #include "kernels/network.h"
 #include "kernels/splat.h"
-#include "runtime/device/program.h"
-#include "runtime/device/state.h"
+#include "runtime/device/executable.h"
+#include "runtime/device/tensor_pool.h"
 
 #include <algorithm>
 #include <cmath>
@@ -23,10 +23,10 @@ Status search_batch(Device& device, std::span<const PointRow> queries, std::span
                     float radius, std::span<double> best)
 {
     const auto rows = uint32_t(queries.size());
-    State state;
-    const Slot points = state.slot(uint32_t(batch.size()), 4, DType::f32, "points", 4);
-    const Slot samples = state.slot(rows, 4, DType::f32, "queries", 4);
-    const Slot nearest = state.slot(rows, 1, DType::u32, "nearest", 1);
+    TensorPool state;
+    const DeviceTensor points = state.tensor(uint32_t(batch.size()), 4, DType::f32, "points", 4);
+    const DeviceTensor samples = state.tensor(rows, 4, DType::f32, "queries", 4);
+    const DeviceTensor nearest = state.tensor(rows, 1, DType::u32, "nearest", 1);
     SR_CHECK(state.allocate(device, "points"));
     SR_CHECK(points.write(device, batch));
     SR_CHECK(samples.write(device, queries));
@@ -34,8 +34,8 @@ Status search_batch(Device& device, std::span<const PointRow> queries, std::span
     KnnOptions options{.neighbors = 1, .cell_size = cell_size, .radius = radius};
     options.queries = samples.in(g);
     g.keep(knn(g, points.in(g), options), nearest);
-    SR_TRY(const auto program, Program::create(device, g));
-    SR_CHECK(program->run());
+    SR_TRY(const auto executable, Executable::create(device, g));
+    SR_CHECK(executable->run());
     SR_TRY(const std::vector<uint32_t> index, nearest.read<uint32_t>(device));
     for (size_t i = 0; i < rows; ++i) {
         if (index[i] >= batch.size())

@@ -4,7 +4,7 @@
 
 #include "engine/mesh/bvh.h"
 #include "kernels/mesh.h"
-#include "runtime/device/program.h"
+#include "runtime/device/executable.h"
 
 #include <algorithm>
 #include <bit>
@@ -73,8 +73,8 @@ Result<NearestSurface> NearestSurface::create(Device& device, const Mesh& mesh)
         const size_t count = std::min(most, mesh.faces.size() - first);
         const Bvh tree = build_bvh(positions, std::span(mesh.faces).subspan(first, count));
         Tree& t = s.trees_.emplace_back();
-        t.nodes = t.state.slot(uint32_t(tree.nodes.size()), 16, DType::u32, "nodes", 16);
-        t.triangles = t.state.slot(uint32_t(count), 10, DType::u32, "triangles", 10);
+        t.nodes = t.state.tensor(uint32_t(tree.nodes.size()), 16, DType::u32, "nodes", 16);
+        t.triangles = t.state.tensor(uint32_t(count), 10, DType::u32, "triangles", 10);
         SR_CHECK(t.state.allocate(device, "triangles"));
         SR_CHECK(t.nodes.write(device, tree.nodes));
         SR_CHECK(t.triangles.write(device, rows_of(tree.order, positions, mesh, first)));
@@ -85,17 +85,17 @@ Result<NearestSurface> NearestSurface::create(Device& device, const Mesh& mesh)
 Status NearestSurface::search(std::span<const std::array<float, 4>> points, std::span<NearestFace> nearest) const
 {
     const auto rows = uint32_t(points.size());
-    State state;
-    const Slot queries = state.slot(rows, 4, DType::f32, "points", 4);
-    const Slot results = state.slot(rows, 2, DType::u32, "nearest faces", 2);
+    TensorPool state;
+    const DeviceTensor queries = state.tensor(rows, 4, DType::f32, "points", 4);
+    const DeviceTensor results = state.tensor(rows, 2, DType::u32, "nearest faces", 2);
     SR_CHECK(state.allocate(*device_, "points"));
     SR_CHECK(queries.write(*device_, points));
     SR_CHECK(results.write(*device_, nearest));
     Graph g(device_->limits());
     for (const Tree& tree : trees_)
         surface_distance(g, queries.in(g), {tree.nodes.in(g), tree.triangles.in(g)}, results.in(g));
-    SR_TRY(const auto program, Program::create(*device_, g));
-    SR_CHECK(program->run());
+    SR_TRY(const auto executable, Executable::create(*device_, g));
+    SR_CHECK(executable->run());
     return device_->read(results.slice(), std::as_writable_bytes(nearest));
 }
 

@@ -120,9 +120,9 @@ Status TextureAtlas::upload_tables(Device& device, const Mesh& mesh, const Rows&
     auto rows = table.rows;
     if (rows.empty())
         rows.push_back({1, 1, 0, 0}); // a binding is never empty
-    materials_ = tables_.slot(uint32_t(materials.size()), 8, DType::u32, "materials", 8);
-    textures_ = tables_.slot(uint32_t(rows.size()), 4, DType::u32, "textures", 4);
-    alphas_ = tables_.slot(uint32_t(table.alpha_words.size()), 1, DType::u32, "alphas", 1);
+    materials_ = tables_.tensor(uint32_t(materials.size()), 8, DType::u32, "materials", 8);
+    textures_ = tables_.tensor(uint32_t(rows.size()), 4, DType::u32, "textures", 4);
+    alphas_ = tables_.tensor(uint32_t(table.alpha_words.size()), 1, DType::u32, "alphas", 1);
     SR_CHECK(tables_.allocate(device, "materials"));
     SR_CHECK(alphas_.write(device, table.alpha_words));
     SR_CHECK(materials_.write(device, materials));
@@ -140,7 +140,7 @@ Status TextureAtlas::upload_texels(Device& device, const Mesh& mesh, const std::
     const auto flush = [&]() -> Status {
         Page& p = pages_.emplace_back();
         p.first = uint32_t(written);
-        p.texels = p.state.slot(uint32_t(page.size()), 1, DType::u32, "texels", 1);
+        p.texels = p.state.tensor(uint32_t(page.size()), 1, DType::u32, "texels", 1);
         SR_CHECK(p.state.allocate(device, "texels"));
         SR_CHECK(p.texels.write(device, page));
         written += page.size();

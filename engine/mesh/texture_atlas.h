@@ -5,7 +5,7 @@
 #include "engine/mesh/mesh.h"
 #include "kernels/mesh.h"
 #include "runtime/device/device.h"
-#include "runtime/device/state.h"
+#include "runtime/device/tensor_pool.h"
 
 namespace semrover {
 
@@ -28,8 +28,8 @@ class TextureAtlas {
 
   private:
     struct Page {
-        State state;
-        Slot texels;
+        TensorPool state;
+        DeviceTensor texels;
         uint32_t first;
     };
     struct Rows { // of textures
@@ -42,8 +42,8 @@ class TextureAtlas {
     Status upload_texels(Device& device, const Mesh& mesh, const std::vector<int32_t>& label_sources,
                          uint8_t default_label, uint64_t texels);
 
-    State tables_;
-    Slot materials_, textures_, alphas_;
+    TensorPool tables_;
+    DeviceTensor materials_, textures_, alphas_;
     std::vector<Page> pages_;
     bool has_labels_ = false, masked_ = false;
 };

@@ -8,8 +8,8 @@
 #include "engine/scene/srgb.h"
 #include "engine/voxfield/token_codec.h"
 #include "kernels/sort.h"
-#include "runtime/device/program.h"
-#include "runtime/device/state.h"
+#include "runtime/device/executable.h"
+#include "runtime/device/tensor_pool.h"
 
 #include <algorithm>
 #include <bit>
@@ -89,11 +89,11 @@ class Voxelizer {
 
   private:
     struct ChunkMemory {
-        State state;
+        TensorPool state;
         uint32_t pairs, cells;
-        Slot records, attributes;
-        Slot triangles, sums;                         // of pairs
-        Slot starts, areas, labels, unlabelled_areas; // of voxels
+        DeviceTensor records, attributes;
+        DeviceTensor triangles, sums;                         // of pairs
+        DeviceTensor starts, areas, labels, unlabelled_areas; // of voxels
 
         ChunkMemory(uint32_t triangles, uint32_t pairs, uint32_t cells);
         SurfaceTriangles in(Graph& g, const TextureAtlas& atlas) const;
@@ -112,8 +112,8 @@ class Voxelizer {
     const Mesh& mesh_;
     const VoxelizeOptions& options_;
     TextureAtlas atlas_;
-    State constants_;
-    Slot light_;
+    TensorPool constants_;
+    DeviceTensor light_;
     VoxelizedMesh out_;
     double unlabelled_ = 0; // m^2
 };
@@ -121,14 +121,14 @@ class Voxelizer {
 Voxelizer::ChunkMemory::ChunkMemory(uint32_t triangle_count, uint32_t pair_count, uint32_t cell_count)
     : pairs(pair_count), cells(cell_count)
 {
-    records = state.slot(triangle_count, 12, DType::u32, "triangles", 12);
-    attributes = state.slot(triangle_count, 16, DType::u32, "attributes", 16);
-    triangles = state.slot(pairs, 1, DType::u32, "triangles of pairs", 1);
-    sums = state.slot(pairs, 1, DType::f32, "sums of areas", 1);
-    starts = state.slot(cells + 1, 1, DType::u32, "first pairs", 1);
-    areas = state.slot(cells, 1, DType::f32, "areas", 1);
-    labels = state.slot(cells, 1, DType::u32, "labels", 1);
-    unlabelled_areas = state.slot(cells, 1, DType::f32, "unlabelled areas", 1);
+    records = state.tensor(triangle_count, 12, DType::u32, "triangles", 12);
+    attributes = state.tensor(triangle_count, 16, DType::u32, "attributes", 16);
+    triangles = state.tensor(pairs, 1, DType::u32, "triangles of pairs", 1);
+    sums = state.tensor(pairs, 1, DType::f32, "sums of areas", 1);
+    starts = state.tensor(cells + 1, 1, DType::u32, "first pairs", 1);
+    areas = state.tensor(cells, 1, DType::f32, "areas", 1);
+    labels = state.tensor(cells, 1, DType::u32, "labels", 1);
+    unlabelled_areas = state.tensor(cells, 1, DType::f32, "unlabelled areas", 1);
 }
 
 SurfaceTriangles Voxelizer::ChunkMemory::in(Graph& g, const TextureAtlas& atlas) const
@@ -178,8 +178,8 @@ Status Voxelizer::measure(const ChunkMemory& m)
     g.keep(cells.areas, m.areas);
     g.keep(cells.labels, m.labels);
     g.keep(cells.unlabelled, m.unlabelled_areas);
-    SR_TRY(const auto program, Program::create(device_, g));
-    return program->run();
+    SR_TRY(const auto executable, Executable::create(device_, g));
+    return executable->run();
 }
 
 // those with enough area go into the grid
@@ -208,9 +208,9 @@ Result<std::vector<Voxelizer::CellRow>> Voxelizer::keep_cells(const SurfaceChunk
 Status Voxelizer::sample(const ChunkMemory& m, std::span<const CellRow> cells)
 {
     const auto n = uint32_t(options_.points_per_voxel);
-    State state;
-    const Slot rows = state.slot(uint32_t(cells.size()), 4, DType::i32, "cells", 4);
-    const Slot results = state.slot(uint32_t(cells.size()) * n, 4, DType::u32, "samples", 4);
+    TensorPool state;
+    const DeviceTensor rows = state.tensor(uint32_t(cells.size()), 4, DType::i32, "cells", 4);
+    const DeviceTensor results = state.tensor(uint32_t(cells.size()) * n, 4, DType::u32, "samples", 4);
     SR_CHECK(state.allocate(device_, "samples"));
     SR_CHECK(rows.write(device_, cells));
     Graph g(device_.limits());
@@ -220,8 +220,8 @@ Status Voxelizer::sample(const ChunkMemory& m, std::span<const CellRow> cells)
     const Tensor texels = fill(g, results.rows() * 4, 0xffffffff);
     atlas_.gather(g, points.addresses, texels);
     g.keep(surface_color(g, points, texels, light_.in(g)), results);
-    SR_TRY(const auto program, Program::create(device_, g));
-    SR_CHECK(program->run());
+    SR_TRY(const auto executable, Executable::create(device_, g));
+    SR_CHECK(executable->run());
     using Sample = std::array<uint32_t, 4>;
     SR_TRY(const std::vector<Sample> samples, results.read<Sample>(device_));
     store(samples, cells.size());
@@ -268,7 +268,7 @@ Result<VoxelizedMesh> Voxelizer::run(std::span<const uint8_t> labels)
         linear[i] = float(kLinear[i]);
         linear[256 + i] = float(linear_of_srgb((double(i) + 0.5) / 255));
     }
-    light_ = constants_.slot(512, 1, DType::f32, "linear light", 1);
+    light_ = constants_.tensor(512, 1, DType::f32, "linear light", 1);
     SR_CHECK(constants_.allocate(device_, "linear light"));
     SR_CHECK(light_.write(device_, linear));
     const SurfaceLimits limits = this->limits();

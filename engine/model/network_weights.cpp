@@ -34,7 +34,7 @@ DType NetworkWeights::type_of(const TensorSpec& weight, std::optional<DType> oth
 
 WeightLayout& NetworkWeights::add(const std::string& name, uint32_t rows, uint32_t cols, DType dtype)
 {
-    weights_.push_back({state_.slot(rows, cols, dtype, name), {}});
+    weights_.push_back({state_.tensor(rows, cols, dtype, name), {}});
     return weights_.back();
 }
 
@@ -106,14 +106,14 @@ Layer NetworkWeights::norm(const std::string& name, uint32_t channels)
     return layer;
 }
 
-Slot NetworkWeights::table(const std::string& name, uint32_t rows, uint32_t cols)
+DeviceTensor NetworkWeights::table(const std::string& name, uint32_t rows, uint32_t cols)
 {
     WeightLayout& weight = add(name + ".weight", rows, cols, DType::f32);
     weight.parts.push_back({{name + ".weight", {rows, cols}}, cols, straight(rows), straight(cols)});
     return weight.weight;
 }
 
-Slot NetworkWeights::share(const FrameShare& share)
+DeviceTensor NetworkWeights::share(const FrameShare& share)
 {
     WeightLayout& weight = add(share.mix_factor, 1, 1, DType::f32);
     weight.parts.push_back({{"", {1}}, 1, straight(1), straight(1)});

@@ -9,7 +9,7 @@ namespace semrover {
 
 // a layer of a network: its packed weight, and its bias in fp32, or none
 struct Layer {
-    Slot weight, bias;
+    DeviceTensor weight, bias;
 };
 
 // Parameters in device memory, in the layouts that the kernels read. First every layer is declared, then all of them
@@ -21,7 +21,7 @@ class NetworkWeights {
 
     DType precision() const { return precision_; }
 
-    Slot share(const FrameShare& share); // [1, 1] fp32
+    DeviceTensor share(const FrameShare& share); // [1, 1] fp32
 
     // convolution over C channels, or C and C2 that come as two inputs: [N, kernel^2 * (C + C2)], tap by tap, each
     // input padded to kRowPadding. `gain` multiplies weights, `bias_gain` biases. Without a dtype: the network's
@@ -52,8 +52,8 @@ class NetworkWeights {
     };
     Layer linear(const std::vector<Part>& parts, const LinearShape& shape);
 
-    Layer norm(const std::string& name, uint32_t channels);            // weight and bias, [1, channels] fp32
-    Slot table(const std::string& name, uint32_t rows, uint32_t cols); // an embedding, fp32
+    Layer norm(const std::string& name, uint32_t channels);                    // weight and bias, [1, channels] fp32
+    DeviceTensor table(const std::string& name, uint32_t rows, uint32_t cols); // an embedding, fp32
 
     uint64_t parameters() const { return parameters_of(weights_); } // as in the file
     uint64_t device_bytes(const DeviceLimits& limits) const { return state_.planned_bytes(limits); }
@@ -67,7 +67,7 @@ class NetworkWeights {
 
     DType precision_;
     bool blocks_;
-    State state_;
+    TensorPool state_;
     std::vector<WeightLayout> weights_;
 };
 

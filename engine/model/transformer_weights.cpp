@@ -13,7 +13,8 @@ TransformerWeights::TransformerWeights(const TransformerConfig& config, DType pr
     : config_(config), precision_(precision)
 {
     const uint32_t d = config.dim(), c = config.channels(), p = config.pos_embed_dim;
-    const auto linear = [&](const std::string& name, uint32_t out, uint32_t in, DType dtype, Slot& w, Slot& b) {
+    const auto linear = [&](const std::string& name, uint32_t out, uint32_t in, DType dtype, DeviceTensor& w,
+                            DeviceTensor& b) {
         w = add(out, in, dtype, name);
         b = add(1, out, DType::f32, name + ".bias");
         place(name, w, b, 0, out);
@@ -43,9 +44,9 @@ TransformerWeights::TransformerWeights(const TransformerConfig& config, DType pr
         add_block(i, i + 1 == config.num_layers);
 }
 
-Slot TransformerWeights::add(uint32_t rows, uint32_t cols, DType dtype, std::string_view name)
+DeviceTensor TransformerWeights::add(uint32_t rows, uint32_t cols, DType dtype, std::string_view name)
 {
-    weights_.push_back({state_.slot(rows, cols, dtype, name), {}});
+    weights_.push_back({state_.tensor(rows, cols, dtype, name), {}});
     return weights_.back().weight;
 }
 
@@ -60,14 +61,14 @@ std::vector<TensorSpec> TransformerWeights::schema() const
     return config_.q8_0 ? with_scales(std::move(specs)) : specs;
 }
 
-void TransformerWeights::put(const Slot& slot, WeightPart part)
+void TransformerWeights::put(const DeviceTensor& slot, WeightPart part)
 {
     const auto at = std::ranges::find_if(weights_, [&](const WeightLayout& w) { return w.weight.same_as(slot); });
     at->parts.push_back(std::move(part));
 }
 
 // all of a matrix
-void TransformerWeights::place(const std::string& name, const Slot& weight)
+void TransformerWeights::place(const std::string& name, const DeviceTensor& weight)
 {
     put(weight, {{name + ".weight", {weight.rows(), weight.cols()}},
                  weight.cols(),
@@ -75,8 +76,8 @@ void TransformerWeights::place(const std::string& name, const Slot& weight)
                  straight(weight.cols())});
 }
 
-void TransformerWeights::place(const std::string& name, const Slot& weight, const Slot& bias, uint32_t row,
-                               uint32_t rows, uint32_t bias_row, uint32_t bias_col)
+void TransformerWeights::place(const std::string& name, const DeviceTensor& weight, const DeviceTensor& bias,
+                               uint32_t row, uint32_t rows, uint32_t bias_row, uint32_t bias_col)
 {
     put(weight,
         {{name + ".weight", {rows, weight.cols()}}, weight.cols(), straight(rows, row), straight(weight.cols())});
@@ -84,8 +85,8 @@ void TransformerWeights::place(const std::string& name, const Slot& weight, cons
 }
 
 // AdaLayerNormContinuous stores scale before shift; the kernels want shift before scale
-void TransformerWeights::place_swapped(const std::string& name, const Slot& weight, const Slot& bias, uint32_t row,
-                                       uint32_t rows)
+void TransformerWeights::place_swapped(const std::string& name, const DeviceTensor& weight, const DeviceTensor& bias,
+                                       uint32_t row, uint32_t rows)
 {
     const uint32_t half = rows / 2;
     const IndexRanges swapped{{0, row + half, half}, {half, row, half}};

@@ -54,7 +54,7 @@ struct Opened {
     bool scaled() const { return part->gain != 1 || share != 1; }
     bool converts(DType to) const { return values.dtype != to || scaled(); }
     // are its rows those of the weight, byte for byte?
-    bool lies_as(const Slot& weight) const
+    bool lies_as(const DeviceTensor& weight) const
     {
         return !converts(weight.dtype()) && part->taps == 1 && part->cols.size() == 1 && part->cols[0].to == 0 &&
                part->cols[0].count == weight.ld();
@@ -120,7 +120,7 @@ class Packer {
         SR_CHECK(open(w));
         const std::vector<Piece> pieces = pieces_of(w);
         SR_ASSERT(!pieces.empty() && pieces.back().to < w.weight.rows(), "rows beyond those of '{}'", w.weight.name());
-        const Slot& weight = w.weight;
+        const DeviceTensor& weight = w.weight;
         const uint64_t row_bytes = row_bytes_of(weight.dtype(), weight.ld());
         const uint32_t at_once = uint32_t(std::max<uint64_t>(device_.most_room() / row_bytes, 1));
         auto next = pieces.begin();
@@ -173,7 +173,8 @@ class Packer {
         return {};
     }
 
-    Status pack_rows(const Slot& weight, std::span<const Piece> pieces, uint32_t first, std::span<std::byte> room)
+    Status pack_rows(const DeviceTensor& weight, std::span<const Piece> pieces, uint32_t first,
+                     std::span<std::byte> room)
     {
         const uint64_t row_bytes = row_bytes_of(weight.dtype(), weight.ld());
         uint32_t done = first; // rows that are packed or empty
@@ -233,7 +234,7 @@ class Packer {
     }
 
     // int8 and, behind the row's last, the scales of its blocks
-    Status pack_blocks(const Slot& weight, const Opened& o, const Piece& piece, std::byte* to)
+    Status pack_blocks(const DeviceTensor& weight, const Opened& o, const Piece& piece, std::byte* to)
     {
         const uint64_t element = uint64_t(piece.from) * o.elements();
         std::span<const std::byte> row = o.row(piece.from), scales;
@@ -259,7 +260,7 @@ class Packer {
         return {};
     }
 
-    Status pack_row(const Slot& weight, const Opened& o, const Piece& piece, std::byte* to)
+    Status pack_row(const DeviceTensor& weight, const Opened& o, const Piece& piece, std::byte* to)
     {
         const DType dtype = weight.dtype();
         std::span<const std::byte> row = o.row(piece.from);

@@ -5,7 +5,7 @@
 #include "engine/model/load_progress.h"
 #include "runtime/base/safetensors.h"
 #include "runtime/device/device.h"
-#include "runtime/device/state.h"
+#include "runtime/device/tensor_pool.h"
 
 #include <functional>
 #include <optional>
@@ -45,7 +45,7 @@ struct WeightPart {
     std::optional<FrameShare> share = {}; // multiplies, too
 };
 struct WeightLayout {
-    Slot weight;
+    DeviceTensor weight;
     std::vector<WeightPart> parts;
 };
 

@@ -56,8 +56,8 @@ Transformer::Transformer(const TransformerConfig& config, DType precision)
     }
     block_columns_.push_back(column);
     modulation_width_ = column + 2 * config.dim();
-    position_frequencies_ = constants_.slot(config.pos_embed_dim / 2, 1, DType::f32, "frequencies", 1);
-    time_frequencies_ = constants_.slot(kTimeFrequencies, 1, DType::f32, "frequencies", 1);
+    position_frequencies_ = constants_.tensor(config.pos_embed_dim / 2, 1, DType::f32, "frequencies", 1);
+    time_frequencies_ = constants_.tensor(kTimeFrequencies, 1, DType::f32, "frequencies", 1);
 }
 
 Result<std::unique_ptr<Transformer>> Transformer::load(Device& device, const Path& folder, DType precision,
@@ -90,7 +90,7 @@ uint64_t Transformer::device_bytes(const DeviceLimits& limits) const
 Status Transformer::upload_frequencies(Device& device)
 {
     SR_CHECK(constants_.allocate(device, "frequencies"));
-    for (const Slot& slot : {position_frequencies_, time_frequencies_}) {
+    for (const DeviceTensor& slot : {position_frequencies_, time_frequencies_}) {
         const uint32_t n = slot.rows();
         std::vector<float> w(n);
         for (uint32_t i = 0; i < n; ++i)
@@ -130,7 +130,7 @@ void Transformer::modulations(Graph& g, Tensor timesteps, Tensor table) const
         silu(g, gemm(g, waves, weights_.time_in.in(g), weights_.time_in_bias.in(g), {.dtype = DType::f32})); // [T, D]
     const Tensor temb = silu(g, gemm(g, hidden, weights_.time_out.in(g), weights_.time_out_bias.in(g),
                                      {.dtype = precision_})); // [T, D], after the SiLU that every adaLN begins with
-    const auto project = [&](const Slot& w, const Slot& bias, uint32_t column) {
+    const auto project = [&](const DeviceTensor& w, const DeviceTensor& bias, uint32_t column) {
         (void)gemm(g, temb, w.in(g), bias.in(g), {.dtype = DType::f32, .part = {.whole = table, .col = column}});
     };
     for (size_t i = 0; i < weights_.blocks.size(); ++i)

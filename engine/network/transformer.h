@@ -98,8 +98,8 @@ class Transformer {
     TransformerWeights weights_;
     std::vector<uint32_t> block_columns_; // first column of each block in the modulation table; last: norm_out
     uint32_t modulation_width_ = 0;
-    State constants_;
-    Slot position_frequencies_, time_frequencies_;
+    TensorPool constants_;
+    DeviceTensor position_frequencies_, time_frequencies_;
 };
 
 } // namespace semrover

@@ -25,7 +25,7 @@ struct Transformer2d {
     std::vector<FrameBlock> frame_blocks; // of a video: as many
     Layer frame_in, frame_out;            // of a video: embedding of a frame's number
     uint32_t frame_col = 0;               // its first column in the frame table
-    Slot share;                           // of the frame blocks
+    DeviceTensor share;                   // of the frame blocks
     uint32_t channels = 0, heads = 0, groups = 0;
 
     uint32_t head_dim() const { return round_up(channels / heads, kRowPadding); } // as stored

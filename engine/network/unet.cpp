@@ -36,13 +36,13 @@ struct Unet::Impl {
     UnetConfig config;
     NetworkWeights weights;
     Layer conv_in, time_in, time_out, added_in, added_out, time_shifts, context, norm_out, conv_out;
-    Slot class_embedding;
+    DeviceTensor class_embedding;
     std::vector<UnetLevel> down, up;
     std::vector<UnetLayer> mid;
     uint32_t time_width = 0, context_width = 0, frame_width = 0;
-    State constants;
-    Slot frequencies, added_frequencies;
-    std::map<uint32_t, Slot> frame_frequencies; // by the channels of a transformer
+    TensorPool constants;
+    DeviceTensor frequencies, added_frequencies;
+    std::map<uint32_t, DeviceTensor> frame_frequencies; // by the channels of a transformer
 
     Impl(const UnetConfig& c, DType precision) : config(c), weights(precision, c.q8_0)
     {
@@ -54,13 +54,13 @@ struct Unet::Impl {
         time_shifts = weights.linear(shifts, {.cols = config.time_embed_dim()});
         if (!context_parts.empty())
             context = weights.linear(context_parts, {.cols = config.cross_attention_dim, .bias = false});
-        frequencies = constants.slot(config.block_out_channels[0] / 2, 1, DType::f32, "frequencies", 1);
+        frequencies = constants.tensor(config.block_out_channels[0] / 2, 1, DType::f32, "frequencies", 1);
         if (!config.video)
             return;
-        added_frequencies = constants.slot(config.added_embed_dim / 2, 1, DType::f32, "added frequencies", 1);
+        added_frequencies = constants.tensor(config.added_embed_dim / 2, 1, DType::f32, "added frequencies", 1);
         for (const uint32_t channels : config.block_out_channels)
             if (!frame_frequencies.contains(channels))
-                frame_frequencies[channels] = constants.slot(channels / 2, 1, DType::f32, "frame frequencies", 1);
+                frame_frequencies[channels] = constants.tensor(channels / 2, 1, DType::f32, "frame frequencies", 1);
     }
 
     // first and last layers, and the time embedding: fp32, its input is up to 1000 radians
@@ -185,7 +185,7 @@ struct Unet::Impl {
         }
     }
 
-    Status upload_waves(Device& device, const Slot& slot, double freq_shift) const
+    Status upload_waves(Device& device, const DeviceTensor& slot, double freq_shift) const
     {
         std::vector<float> w(slot.rows());
         for (size_t i = 0; i < w.size(); ++i)

@@ -195,27 +195,27 @@ SplatLens Rasterizer::lens() const
 
 Status Rasterizer::build()
 {
-    program_.reset();
-    state_ = State();
+    executable_.reset();
+    state_ = TensorPool();
     const uint32_t pixels = width_ * height_ * cameras_;
     const uint32_t camera_floats = splat_camera_floats(lens());
-    camera_table_ = state_.slot(cameras_, camera_floats, DType::f32, "cameras", camera_floats);
-    visible_ = state_.slot(1, 1, DType::u32, "visible splats", 1);
-    pairs_ = state_.slot(1, 1, DType::u32, "splat pairs", 1);
+    camera_table_ = state_.tensor(cameras_, camera_floats, DType::f32, "cameras", camera_floats);
+    visible_ = state_.tensor(1, 1, DType::u32, "visible splats", 1);
+    pairs_ = state_.tensor(1, 1, DType::u32, "splat pairs", 1);
     if (!options_.sweep_rows.empty())
-        sweep_rows_ = state_.slot(height_, 4, DType::f32, "rows of a sweep", 4);
+        sweep_rows_ = state_.tensor(height_, 4, DType::f32, "rows of a sweep", 4);
     if (options_.depth_tested) {
-        z_buffer_ = state_.slot(pixels, 1, DType::f32, "z-buffer", 1);
-        z_scale_ = state_.slot(1, 2, DType::f32, "scale of the z-buffer", 2);
+        z_buffer_ = state_.tensor(pixels, 1, DType::f32, "z-buffer", 1);
+        z_scale_ = state_.tensor(1, 2, DType::f32, "scale of the z-buffer", 2);
     }
     if (options_.movers) {
-        movers_ = state_.slot(cameras_ * views_of_movers(), 12, DType::f32, "views of movers", 12);
-        mover_rows_ = state_.slot(options_.mover_numbers, 1, DType::u32, "rows of movers", 1);
+        movers_ = state_.tensor(cameras_ * views_of_movers(), 12, DType::f32, "views of movers", 12);
+        mover_rows_ = state_.tensor(options_.mover_numbers, 1, DType::u32, "rows of movers", 1);
     }
     if (options_.pixels_over)
-        pixels_ = {state_.slot(pixels, 1, DType::u32, "seen", 1), state_.slot(pixels, 1, DType::u32, "depths", 1),
-                   state_.slot(pixels, 1, DType::u32, "normals", 1),
-                   options_.instances ? state_.slot(pixels, 1, DType::u32, "instances", 1) : Slot()};
+        pixels_ = {state_.tensor(pixels, 1, DType::u32, "seen", 1), state_.tensor(pixels, 1, DType::u32, "depths", 1),
+                   state_.tensor(pixels, 1, DType::u32, "normals", 1),
+                   options_.instances ? state_.tensor(pixels, 1, DType::u32, "instances", 1) : DeviceTensor()};
     else
         declare_images(pixels);
     SR_CHECK(state_.allocate(device_, "splat images"));
@@ -249,7 +249,7 @@ Status Rasterizer::build()
     options_.pixels_over ? keep_pixels(g, y) : keep_images(g, y);
     g.keep(y.visible, visible_);
     g.keep(y.pairs, pairs_);
-    SR_TRY(program_, Program::create(device_, g));
+    SR_TRY(executable_, Executable::create(device_, g));
     return {};
 }
 
@@ -263,11 +263,12 @@ void Rasterizer::declare_images(uint32_t pixels)
         if (texels == Texels::none)
             *slots[i] = {};
         else if (texels == Texels::whole)
-            *slots[i] = state_.slot(pixels, numbers, i >= 3 ? DType::u32 : DType::f32, kImageNames[i], numbers);
+            *slots[i] = state_.tensor(pixels, numbers, i >= 3 ? DType::u32 : DType::f32, kImageNames[i], numbers);
         else
-            *slots[i] = state_.slot(texel_words(texels, width_ * height_) * cameras_, 1, DType::u32, kImageNames[i], 1);
+            *slots[i] =
+                state_.tensor(texel_words(texels, width_ * height_) * cameras_, 1, DType::u32, kImageNames[i], 1);
         if (scaled)
-            format_scale_ = state_.slot(1, 2, DType::f32, "scale of a picture", 2);
+            format_scale_ = state_.tensor(1, 2, DType::f32, "scale of a picture", 2);
     }
 }
 
@@ -332,7 +333,7 @@ Status Rasterizer::draw_together(std::span<const SplatCamera> cameras, const Spl
     std::vector<float> table(size_t(cameras_) * floats);
     for (size_t i = 0; i < cameras.size(); ++i)
         write_row(cameras[i], std::span(table).subspan(i * floats, floats));
-    if (!program_) // there was no memory for it the last time
+    if (!executable_) // there was no memory for it the last time
         SR_CHECK(build());
     for (;;) {
         SR_CHECK(camera_table_.write(device_, table));
@@ -341,7 +342,7 @@ Status Rasterizer::draw_together(std::span<const SplatCamera> cameras, const Spl
             SR_CHECK(mover_rows_.write(device_, tables.rows));
             SR_CHECK(movers_.write(device_, tables.views));
         }
-        SR_CHECK(program_->run());
+        SR_CHECK(executable_->run());
         const BufferSlice slices[] = {visible_.slice(), pairs_.slice()};
         uint32_t counts[2] = {};
         SR_CHECK(device_.read(slices, [&](const ReadPiece& piece) {
@@ -358,7 +359,7 @@ Status Rasterizer::record(VkCommandBuffer commands, const SplatCamera& camera, s
                           std::array<float, 2> format_scale, const SplatMovers& movers)
 {
     SR_CHECK(check_camera(camera, 0));
-    if (!program_) // there was no memory for it the last time
+    if (!executable_) // there was no memory for it the last time
         SR_CHECK(build());
     if (!recorded_) {
         SR_TRY(recorded_, Buffer::create(device_, kRecordings * sizeof(uint32_t), MemoryKind::staging, "counts"));
@@ -382,7 +383,7 @@ Status Rasterizer::record(VkCommandBuffer commands, const SplatCamera& camera, s
         record_update(vk, commands, rows.buffer->handle(), rows.offset, std::as_bytes(std::span(tables.rows)));
         record_update(vk, commands, views.buffer->handle(), views.offset, std::as_bytes(std::span(tables.views)));
     }
-    program_->record_into(commands);
+    executable_->record_into(commands);
     const BufferSlice pairs = pairs_.slice();
     const uint64_t at = recording_++ % kRecordings * sizeof(uint32_t);
     record_copy(vk, commands, pairs.buffer->handle(), pairs.offset, recorded_->handle(), at, sizeof(uint32_t));
@@ -428,13 +429,13 @@ SplatPixelSlots Rasterizer::pixels(uint32_t camera) const
     const uint32_t pixels = width_ * height_, first = camera * pixels;
     return {pixels_.seen.row_range(first, pixels), pixels_.depths.row_range(first, pixels),
             pixels_.normals.row_range(first, pixels),
-            options_.instances ? pixels_.instances.row_range(first, pixels) : Slot()};
+            options_.instances ? pixels_.instances.row_range(first, pixels) : DeviceTensor()};
 }
 
 SplatSlots Rasterizer::images(uint32_t camera) const
 {
     SplatSlots of_camera = images_;
-    for (Slot* slot : of_camera.all())
+    for (DeviceTensor* slot : of_camera.all())
         if (slot->valid())
             *slot = slot->row_range(camera * (slot->rows() / cameras_), slot->rows() / cameras_);
     return of_camera;
@@ -458,7 +459,7 @@ Status Rasterizer::read_images(std::span<SplatImage> images)
         image.visible.resize(pixels);
         image.owner.resize(owners ? pixels : 0);
         SplatSlots slots = this->images(camera);
-        for (const Slot* slot : slots.all())
+        for (const DeviceTensor* slot : slots.all())
             if (slot->valid())
                 slices.push_back(slot->slice());
     }

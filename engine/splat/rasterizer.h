@@ -5,7 +5,7 @@
 #include "engine/camera/camera_view.h"
 #include "engine/splat/splat_scene.h"
 #include "kernels/picture.h"
-#include "runtime/device/program.h"
+#include "runtime/device/executable.h"
 
 #include <array>
 #include <memory>
@@ -84,11 +84,11 @@ struct RasterizerOptions {
 // what one camera sees, on the device: as SplatImages (kernels/splat.h) has it, a row a pixel, or in words, where
 // another format was asked for, or nothing; or as files have it (PixelWords, kernels/picture.h)
 struct SplatSlots {
-    Slot color, surface, depth, ids, owners;
-    std::array<Slot*, 5> all() { return {&color, &surface, &depth, &ids, &owners}; }
+    DeviceTensor color, surface, depth, ids, owners;
+    std::array<DeviceTensor*, 5> all() { return {&color, &surface, &depth, &ids, &owners}; }
 };
 struct SplatPixelSlots {
-    Slot seen, depths, normals, instances; // the last where it is asked for
+    DeviceTensor seen, depths, normals, instances; // the last where it is asked for
 };
 
 // Things that move at the moment of a draw
@@ -126,10 +126,10 @@ class Rasterizer {
 
     // With depth_tested: [height * width] of the first camera, and [1, 2] fp32, scale and offset: splats farther than
     // scale / (z - offset) metres along z are not drawn. To be filled before each draw
-    const Slot& z_buffer() const { return z_buffer_; }
-    const Slot& z_scale() const { return z_scale_; }
+    const DeviceTensor& z_buffer() const { return z_buffer_; }
+    const DeviceTensor& z_scale() const { return z_scale_; }
     // [1, 2] fp32, where a format is scaled, likewise
-    const Slot& format_scale() const { return format_scale_; }
+    const DeviceTensor& format_scale() const { return format_scale_; }
 
     // The same by an application's hand: records the drawing into a command buffer, to be executed any number of times,
     // one after the other, on the device's queue family. camera: copied. What is recorded is good as long as the
@@ -142,10 +142,13 @@ class Rasterizer {
     uint32_t recorded_pairs() const;
     static constexpr uint32_t kRecordings = 16;
 
-    const Program& program() const { return *program_; }
-    bool is_built() const { return program_ != nullptr; } // false: the last time there was no memory for it
+    const Executable& executable() const { return *executable_; }
+    bool is_built() const { return executable_ != nullptr; } // false: the last time there was no memory for it
     // device memory for what it has room for now, beside the scene's
-    uint64_t planned_bytes() const { return state_.planned_bytes(device_.limits()) + program_->plan().arena_bytes(); }
+    uint64_t planned_bytes() const
+    {
+        return state_.planned_bytes(device_.limits()) + executable_->plan().arena_bytes();
+    }
     uint32_t rows() const { return rows_; } // of the scene that it looks at
     uint32_t max_pairs() const { return max_pairs_; }
     uint32_t rebuilds() const { return rebuilds_; } // how often there was not enough room
@@ -173,13 +176,13 @@ class Rasterizer {
     RasterizerOptions options_;
     uint32_t width_ = 0, height_ = 0, cameras_ = 0, rows_ = 0;
     uint32_t max_visible_ = 0, max_pairs_ = 0, rebuilds_ = 0;
-    State state_;
-    Slot camera_table_, visible_, pairs_, z_buffer_, z_scale_, format_scale_, movers_, mover_rows_, sweep_rows_;
+    TensorPool state_;
+    DeviceTensor camera_table_, visible_, pairs_, z_buffer_, z_scale_, format_scale_, movers_, mover_rows_, sweep_rows_;
     std::unique_ptr<Buffer> recorded_; // [kRecordings] u32: pairs of what was recorded, where the host sees them
     uint32_t recording_ = 0;
     SplatSlots images_;      // of all cameras, or
     SplatPixelSlots pixels_; // likewise
-    std::unique_ptr<Program> program_;
+    std::unique_ptr<Executable> executable_;
 };
 
 } // namespace semrover

@@ -59,7 +59,7 @@ Result<SplatRooms::Room*> SplatRooms::room_for(size_t points, const PointSplatOp
     SR_TRY(room->upload, Buffer::create(device_, uint64_t(rows) * kRowBytes, MemoryKind::staging, "points of a tile"));
     Graph g(device_.limits());
     room->scene.derive(g, options);
-    SR_TRY(room->program, Program::create(device_, g));
+    SR_TRY(room->executable, Executable::create(device_, g));
     return rooms_.emplace_back(std::move(room)).get();
 }
 
@@ -81,12 +81,12 @@ Result<const SplatScene*> SplatRooms::record(VkCommandBuffer commands, const Sce
     const auto [positions, normals, colors, labels, cells, owners] = room->scene.arrays();
     record_entry_barrier(device_.vk(), commands); // the splats of the tile before have been copied
     uint64_t at = 0;
-    for (const Slot& slot : {positions, colors, labels, cells, owners}) {
+    for (const DeviceTensor& slot : {positions, colors, labels, cells, owners}) {
         const BufferSlice to = slot.slice();
         record_copy(device_.vk(), commands, room->upload->handle(), at, to.buffer->handle(), to.offset, to.bytes);
         at += to.bytes;
     }
-    room->program->record_into(commands);
+    room->executable->record_into(commands);
     room->busy_until = device_.last_ticket() + 1;
     return &room->scene;
 }

@@ -3,11 +3,11 @@
 #pragma once
 
 #include "engine/splat/splat_scene.h"
-#include "runtime/device/program.h"
+#include "runtime/device/executable.h"
 
 namespace semrover {
 
-// Makes splats of few points again and again, as of the tiles of a world. A room is memory and program for as many
+// Makes splats of few points again and again, as of the tiles of a world. A room is memory and executable for as many
 // points as a power of two, made once for each size and options, and used again.
 class SplatRooms {
   public:
@@ -28,7 +28,7 @@ class SplatRooms {
         PointSplatOptions options;
         SplatScene scene;
         std::unique_ptr<Buffer> upload; // positions, colours, labels and voxels, one after the other
-        std::unique_ptr<Program> program;
+        std::unique_ptr<Executable> executable;
         uint64_t busy_until = 0; // a ticket
     };
     Result<Room*> room_for(size_t points, const PointSplatOptions& options);

@@ -5,7 +5,7 @@
 #include "engine/scene/palette.h"
 #include "runtime/device/command.h"
 #include "runtime/device/command_ring.h"
-#include "runtime/device/program.h"
+#include "runtime/device/executable.h"
 
 #include <cmath>
 
@@ -103,8 +103,8 @@ Result<SplatScene> SplatScene::create(Device& device, const ScenePoints& points,
         return scene;
     Graph g(device.limits());
     scene.derive(g, options);
-    SR_TRY(const auto program, Program::create(device, g));
-    SR_CHECK(program->run());
+    SR_TRY(const auto executable, Executable::create(device, g));
+    SR_CHECK(executable->run());
     return scene;
 }
 
@@ -131,7 +131,7 @@ Result<SplatScene> SplatScene::reserve(Device& device, uint32_t size, bool by_bl
     SplatScene scene(device);
     scene.size_ = size;
     SR_CHECK(scene.allocate(by_blocks));
-    for (const Slot& slot : scene.arrays())
+    for (const DeviceTensor& slot : scene.arrays())
         SR_CHECK(slot.clear(device));
     if (by_blocks)
         SR_CHECK(scene.blocks_.clear(device));
@@ -174,14 +174,14 @@ void SplatScene::record_put(VkCommandBuffer commands, uint32_t first, const Spla
 Status SplatScene::allocate(bool by_blocks)
 {
     const uint32_t rows = std::max(size_, 1u);
-    positions_ = state_.slot(rows, 4, DType::f32, "positions", 4);
-    normals_ = state_.slot(rows, 4, DType::f32, "normals", 4);
-    colors_ = state_.slot(rows, 4, DType::f32, "colours", 4);
-    labels_ = state_.slot(rows, 1, DType::u32, "labels", 1);
-    cells_ = state_.slot(rows, 1, DType::u32, "cells", 1);
-    owners_ = state_.slot(rows, 1, DType::u32, "owners", 1);
+    positions_ = state_.tensor(rows, 4, DType::f32, "positions", 4);
+    normals_ = state_.tensor(rows, 4, DType::f32, "normals", 4);
+    colors_ = state_.tensor(rows, 4, DType::f32, "colours", 4);
+    labels_ = state_.tensor(rows, 1, DType::u32, "labels", 1);
+    cells_ = state_.tensor(rows, 1, DType::u32, "cells", 1);
+    owners_ = state_.tensor(rows, 1, DType::u32, "owners", 1);
     if (by_blocks)
-        blocks_ = state_.slot(divide_up(rows, kBlock), 1, DType::u32, "blocks of splats", 1);
+        blocks_ = state_.tensor(divide_up(rows, kBlock), 1, DType::u32, "blocks of splats", 1);
     return state_.allocate(*device_, "splats");
 }
 
@@ -191,7 +191,7 @@ Status SplatScene::upload(const Host& host)
     skipped_ = uint32_t(host.skipped());
     SR_CHECK(allocate());
     if (!size_) {
-        for (const Slot& slot : arrays())
+        for (const DeviceTensor& slot : arrays())
             SR_CHECK(slot.clear(*device_));
         return {};
     }
@@ -222,7 +222,7 @@ void SplatScene::derive(Graph& g, const PointSplatOptions& options) const
 
 SplatTensors SplatScene::in(Graph& g, uint32_t rows) const
 {
-    const auto first = [&](const Slot& slot) { return slot.row_range(0, std::max(rows, 1u)).in(g); };
+    const auto first = [&](const DeviceTensor& slot) { return slot.row_range(0, std::max(rows, 1u)).in(g); };
     SplatTensors scene{first(positions_), first(normals_), first(colors_),
                        first(labels_),    first(cells_),   first(owners_)};
     if (blocks_.valid())

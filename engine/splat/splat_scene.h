@@ -7,7 +7,7 @@
 #include "kernels/network.h"
 #include "kernels/splat.h"
 #include "runtime/device/device.h"
-#include "runtime/device/state.h"
+#include "runtime/device/tensor_pool.h"
 
 namespace semrover {
 
@@ -52,9 +52,9 @@ class SplatScene {
     void derive(Graph& g, const PointSplatOptions& options) const;
 
     // the whole arrays, of which in() gives rows, in its order
-    std::array<Slot, 6> arrays() const { return {positions_, normals_, colors_, labels_, cells_, owners_}; }
+    std::array<DeviceTensor, 6> arrays() const { return {positions_, normals_, colors_, labels_, cells_, owners_}; }
 
-    const Slot& blocks() const { return blocks_; } // one that is not valid: there are none
+    const DeviceTensor& blocks() const { return blocks_; } // one that is not valid: there are none
 
     uint32_t size() const { return size_; }       // splats
     uint32_t skipped() const { return skipped_; } // of these, not drawn: not finite, or without normal, size or opacity
@@ -74,8 +74,8 @@ class SplatScene {
 
     Device* device_;
     uint32_t size_ = 0, skipped_ = 0;
-    State state_;
-    Slot positions_, normals_, colors_, labels_, cells_, owners_, blocks_; // as SplatTensors has them
+    TensorPool state_;
+    DeviceTensor positions_, normals_, colors_, labels_, cells_, owners_, blocks_; // as SplatTensors has them
 };
 
 } // namespace semrover

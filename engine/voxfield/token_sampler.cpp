@@ -8,38 +8,40 @@ namespace semrover {
 
 struct TokenSampler::Batch {
     uint32_t rows, tiles, longest; // rows: of one guidance half
-    State state;
-    Slot labels, cells, sets, tile_list, coords, pos, mask, known, fixed, x, x0, z, table_row; // z: noise that is given
-    Slot condition, conditioning, voxel_conditioning; // none where the model takes labels alone
-    Slot points;
-    std::unique_ptr<Program> prepare, step, unguided, undo, decode; // unguided: of the first half, where steps differ
+    TensorPool state;
+    DeviceTensor labels, cells, sets, tile_list, coords, pos, mask, known, fixed, x, x0, z,
+        table_row;                                            // z: noise that is given
+    DeviceTensor condition, conditioning, voxel_conditioning; // none where the model takes labels alone
+    DeviceTensor points;
+    std::unique_ptr<Executable> prepare, step, unguided, undo,
+        decode; // unguided: of the first half, where steps differ
 
     Batch(const TokenSampler& s, const TokenSets& packed)
         : rows(packed.rows() / s.halves_), tiles(uint32_t(packed.tiles.size() / 4)), longest(packed.longest)
     {
         const Transformer& t = s.transformer_;
         const uint32_t m = packed.rows(), channels = t.config().channels(), words = divide_up(longest, 32);
-        labels = state.slot(m, 1, DType::u32, "labels", 1);
-        cells = state.slot(m, 4, DType::i32, "cells", 4);
-        sets = state.slot(m, 2, DType::u32, "sets", 2);
-        tile_list = state.slot(tiles, 4, DType::u32, "tiles", 4);
-        coords = state.slot(m, 3, DType::f32, "coords", 3);
-        pos = state.slot(m, t.config().dim(), t.precision(), "pos");
-        mask = state.slot(m, words, DType::u32, "mask", words);
-        known = state.slot(rows, 1, DType::u32, "known", 1);
-        fixed = state.slot(rows, channels, DType::f32, "fixed");
-        x = state.slot(rows, channels, DType::f32, "x");
-        x0 = state.slot(rows, channels, DType::f32, "x0");
+        labels = state.tensor(m, 1, DType::u32, "labels", 1);
+        cells = state.tensor(m, 4, DType::i32, "cells", 4);
+        sets = state.tensor(m, 2, DType::u32, "sets", 2);
+        tile_list = state.tensor(tiles, 4, DType::u32, "tiles", 4);
+        coords = state.tensor(m, 3, DType::f32, "coords", 3);
+        pos = state.tensor(m, t.config().dim(), t.precision(), "pos");
+        mask = state.tensor(m, words, DType::u32, "mask", words);
+        known = state.tensor(rows, 1, DType::u32, "known", 1);
+        fixed = state.tensor(rows, channels, DType::f32, "fixed");
+        x = state.tensor(rows, channels, DType::f32, "x");
+        x0 = state.tensor(rows, channels, DType::f32, "x0");
         if (const uint32_t width = t.config().condition_width()) {
-            condition = state.slot(m, width, t.precision(), "condition");
-            conditioning = state.slot(m, t.config().dim(), t.precision(), "conditioning");
+            condition = state.tensor(m, width, t.precision(), "condition");
+            conditioning = state.tensor(m, t.config().dim(), t.precision(), "conditioning");
         }
         if (t.config().condition_voxels)
-            voxel_conditioning = state.slot(m, t.config().dim(), t.precision(), "voxel conditioning");
+            voxel_conditioning = state.tensor(m, t.config().dim(), t.precision(), "voxel conditioning");
         if (s.options_.noise)
-            z = state.slot(rows, channels, DType::f32, "z");
-        table_row = state.slot(2 * m, 1, DType::u32, "table_row", 1);
-        points = state.slot(rows, channels / 2, DType::u32, "points", channels / 2);
+            z = state.tensor(rows, channels, DType::f32, "z");
+        table_row = state.tensor(2 * m, 1, DType::u32, "table_row", 1);
+        points = state.tensor(rows, channels / 2, DType::u32, "points", channels / 2);
     }
     // of both halves, or of the first one
     TokenContext context(Graph& g, uint32_t halves) const
@@ -119,8 +121,8 @@ TokenSampler::~TokenSampler() = default;
 
 TokenSampler::TokenSampler(Device& device, const Transformer& transformer, const SamplingPlan& plan,
                            SamplerOptions options)
-    : Replay(device, plan.rows.size() + 1, [this](size_t row) { return program_of(row); }), transformer_(transformer),
-      plan_(plan), options_(std::move(options)), halves_(1),
+    : StepLoop(device, plan.rows.size() + 1, [this](size_t row) { return executable_of(row); }),
+      transformer_(transformer), plan_(plan), options_(std::move(options)), halves_(1),
       window_(uint32_t(std::min<size_t>(options_.modulation_window, plan.timesteps.size())))
 {
     for (const PlanRow& row : plan_.rows) {
@@ -132,11 +134,11 @@ TokenSampler::TokenSampler(Device& device, const Transformer& transformer, const
             ++unguided_steps_;
     }
     constexpr uint32_t kWords = sizeof(StepRow) / 4;
-    steps_ = state_.slot(uint32_t(plan.rows.size()) + 1, kWords, DType::u32, "steps", kWords);
-    clock_ = ReplayMemory::clock_slot(state_);
-    timesteps_ = state_.slot(window_, 1, DType::f32, "timesteps", 1);
-    table_ = state_.slot(window_, transformer.modulation_width(), DType::f32, "modulations");
-    normalization_ = state_.slot(2, 6, DType::f32, "normalization", 6);
+    steps_ = state_.tensor(uint32_t(plan.rows.size()) + 1, kWords, DType::u32, "steps", kWords);
+    clock_ = StepMemory::clock_tensor(state_);
+    timesteps_ = state_.tensor(window_, 1, DType::f32, "timesteps", 1);
+    table_ = state_.tensor(window_, transformer.modulation_width(), DType::f32, "modulations");
+    normalization_ = state_.tensor(2, 6, DType::f32, "normalization", 6);
 }
 
 Result<std::unique_ptr<TokenSampler>> TokenSampler::create(Device& device, const Transformer& transformer,
@@ -190,7 +192,7 @@ Status TokenSampler::make_modulations()
 {
     Graph g(device_.limits());
     transformer_.modulations(g, timesteps_.in(g), table_.in(g));
-    SR_TRY(modulations_, Program::create(device_, g));
+    SR_TRY(modulations_, Executable::create(device_, g));
     return {};
 }
 
@@ -220,13 +222,13 @@ Result<TokenSampler::Batch*> TokenSampler::batch_for(const TokenSets& sets)
     batch_.reset(); // memory of the old shape goes before the new one's comes
     auto b = std::make_unique<Batch>(*this, sets);
     SR_CHECK(b->state.allocate(device_, "sampler state"));
-    SR_TRY(b->prepare, Program::create(device_, b->prepare_graph(*this)));
-    SR_TRY(b->step, Program::create(device_, b->step_graph(*this, halves_)));
+    SR_TRY(b->prepare, Executable::create(device_, b->prepare_graph(*this)));
+    SR_TRY(b->step, Executable::create(device_, b->step_graph(*this, halves_)));
     if (halves_ == 2 && unguided_steps_) {
-        SR_TRY(b->unguided, Program::create(device_, b->step_graph(*this, 1)));
+        SR_TRY(b->unguided, Executable::create(device_, b->step_graph(*this, 1)));
     }
-    SR_TRY(b->undo, Program::create(device_, b->undo_graph(*this)));
-    SR_TRY(b->decode, Program::create(device_, b->decode_graph(*this)));
+    SR_TRY(b->undo, Executable::create(device_, b->undo_graph(*this)));
+    SR_TRY(b->decode, Executable::create(device_, b->decode_graph(*this)));
     batch_ = std::move(b);
     return batch_.get();
 }
@@ -321,7 +323,7 @@ Status TokenSampler::feed_noise(Batch& b, size_t row)
 }
 
 // row 0 is the first noise
-Result<Program*> TokenSampler::program_of(size_t row)
+Result<Executable*> TokenSampler::executable_of(size_t row)
 {
     const bool step = row > 0 && plan_.rows[row - 1].kind == PlanRowKind::step;
     if (step)
@@ -342,7 +344,7 @@ Status TokenSampler::begin(std::span<const RegionInput> regions)
         tokens_ += uint32_t(r.cells.size());
     SR_CHECK(upload(*b, sets, regions));
     SR_CHECK(b->prepare->run());
-    return Replay::begin({clock_, b->x, b->x0});
+    return StepLoop::begin({clock_, b->x, b->x0});
 }
 
 // errors: internal for numbers that are not finite
@@ -382,7 +384,7 @@ Result<std::vector<float>> TokenSampler::run(std::span<const RegionInput> region
     return finish();
 }
 
-const Program& TokenSampler::step_program() const
+const Executable& TokenSampler::step_executable() const
 {
     return *batch_->step;
 }

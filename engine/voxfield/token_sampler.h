@@ -5,9 +5,9 @@
 #include "engine/network/transformer.h"
 #include "engine/sampling/guidance.h"
 #include "engine/sampling/repaint.h"
-#include "engine/sampling/replay.h"
+#include "engine/sampling/step_loop.h"
 #include "kernels/sampling.h"
-#include "runtime/device/program.h"
+#include "runtime/device/executable.h"
 
 #include <functional>
 #include <memory>
@@ -34,7 +34,7 @@ struct SamplerOptions {
 // Denoises batches of regions with the transformer: the graphs are built once per batch shape and replayed for every
 // step, one submit a step. The result of a region depends on nothing but its own input, the plan and the seed: not on
 // where its run stopped and went on.
-class TokenSampler : public Replay {
+class TokenSampler : public StepLoop {
   public:
     static Result<std::unique_ptr<TokenSampler>> create(Device& device, const Transformer& transformer,
                                                         const SamplingPlan& plan, SamplerOptions options);
@@ -55,10 +55,10 @@ class TokenSampler : public Replay {
     Result<std::vector<uint32_t>> finish_points();
 
     // of the batch shape of the last run; its arithmetic is dense: masked attention counts in full
-    const Program& step_program() const;
+    const Executable& step_executable() const;
 
   private:
-    struct Batch; // memory and programs of one batch shape
+    struct Batch; // memory and executables of one batch shape
     TokenSampler(Device& device, const Transformer& transformer, const SamplingPlan& plan, SamplerOptions options);
     bool guided(const PlanRow& step) const;
     Status upload_steps();
@@ -71,7 +71,7 @@ class TokenSampler : public Replay {
     Status upload(Batch& batch, const TokenSets& sets, std::span<const RegionInput> regions);
     Status use_timestep(uint32_t index);
     Status feed_noise(Batch& batch, size_t row);
-    Result<Program*> program_of(size_t row);
+    Result<Executable*> executable_of(size_t row);
     Result<std::vector<float>> read_tokens() const;
 
     const Transformer& transformer_;
@@ -81,9 +81,9 @@ class TokenSampler : public Replay {
     uint32_t unguided_steps_ = 0;
     uint32_t window_; // timesteps that the modulation table holds at a time
     uint32_t first_timestep_ = ~0u;
-    State state_; // what does not depend on the batch
-    Slot steps_, clock_, timesteps_, table_, normalization_;
-    std::unique_ptr<Program> modulations_;
+    TensorPool state_; // what does not depend on the batch
+    DeviceTensor steps_, clock_, timesteps_, table_, normalization_;
+    std::unique_ptr<Executable> modulations_;
     std::unique_ptr<Batch> batch_;
     uint32_t tokens_ = 0; // of the run's regions
 

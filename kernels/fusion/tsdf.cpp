@@ -83,7 +83,7 @@ void tsdf_integrate(Graph& g, Tensor frames, Tensor planes, const TsdfOptions& o
     check_state(state);
     const uint32_t voxels = state.blocks.rows * kTsdfBlockVoxels;
     DispatchOptions dispatch;
-    dispatch.most_operations = 60.0 * voxels * frames.rows; // all voxels in front of the camera
+    dispatch.max_flops = 60.0 * voxels * frames.rows; // all voxels in front of the camera
     g.dispatch(kernel::tsdf_integrate,
                {{"Frames", frames},
                 {"Planes", planes},

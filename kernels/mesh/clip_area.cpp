@@ -33,7 +33,7 @@ SurfaceAreas clip_area(Graph& g, const SurfaceTriangles& s, const SurfacePairs& 
                 {"Alphas", s.alphas}},
                ClipAreaPush{.size = size}, threads(size),
                {.constants = {{"kMasked", s.masked}},
-                .most_operations = size * (s.masked ? kOperationsPerMaskedPair : kOperationsPerPair)});
+                .max_flops = size * (s.masked ? kOperationsPerMaskedPair : kOperationsPerPair)});
     return y;
 }
 

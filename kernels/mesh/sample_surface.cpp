@@ -37,7 +37,7 @@ SurfaceSamples sample_surface(Graph& g, const SurfaceTriangles& s, Tensor triang
                 {"Alphas", s.alphas}},
                push, threads(size),
                {.constants = {{"kCanonical", canonical}, {"kMasked", s.masked}},
-                .most_operations = size * kOperationsPerSample * (s.masked ? kMaskedAttempts : 1)});
+                .max_flops = size * kOperationsPerSample * (s.masked ? kMaskedAttempts : 1)});
     return y;
 }
 

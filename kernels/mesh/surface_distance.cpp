@@ -17,7 +17,7 @@ void surface_distance(Graph& g, Tensor points, const SurfaceTree& tree, Tensor y
     g.dispatch(kernel::surface_distance,
                {{"Points", points}, {"Nodes", tree.nodes}, {"Triangles", tree.triangles}, {"Y", y}},
                SurfaceDistancePush{.size = points.rows, .points_ld = points.ld}, threads(points.rows),
-               {.most_operations = points.rows * kOperationsPerPoint});
+               {.max_flops = points.rows * kOperationsPerPoint});
 }
 
 } // namespace semrover

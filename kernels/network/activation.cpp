@@ -24,7 +24,7 @@ Tensor activation(Graph& g, Tensor x, const Function& f, const PartOf& part = {}
     const ActivationPush push{.rows = x.rows, .x_ld = x.ld, .y_ld = y.ld, .y_col = part.col, .width = width};
     DispatchOptions options;
     options.constants = {{"kFunction", f.index}};
-    options.absorbed_as = f.epilogue;
+    options.epilogue = f.epilogue;
     options.banded = {"X", "Y"};
     g.dispatch(kernel::activation, {{"X", x}, {"Y", y}}, push, threads(x.rows * (width / 8)), std::move(options));
     return y;

@@ -14,7 +14,7 @@ Tensor add(Graph& g, Tensor x, Tensor residual, const PartOf& part)
     const Tensor y = part.valid() ? part.of(x.rows, x.cols) : g.matrix(x.rows, x.cols, residual.dtype, "add");
     const AddPush push{.rows = x.rows, .cols = x.cols, .x_ld = x.ld, .y_ld = y.ld, .residual_ld = residual.ld};
     DispatchOptions options;
-    options.absorbed_as = "kAdd";
+    options.epilogue = "kAdd";
     options.banded = {"X", "Residual", "Y"};
     g.dispatch(kernel::add, {{"X", x}, {"Residual", residual}, {"Y", y}}, push, threads(x.rows * divide_up(x.cols, 8)),
                std::move(options));

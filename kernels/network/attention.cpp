@@ -35,7 +35,7 @@ Tensor attention(Graph& g, Tensor qkv, Tensor tiles, Tensor mask, uint32_t heads
     push.scale = 1.f / std::sqrt(float(head_dim));
     DispatchOptions options;
     options.constants = group_constants(g.limits(), {{"kChunks", head_dim / 8}});
-    const uint32_t excluded = head_dim > kMostMatrixDim ? kNeedsCooperativeMatrix : 0u;
+    const uint32_t excluded = head_dim > kMostMatrixDim ? kFeatureCooperativeMatrix : 0u;
     options.variant = &g.variant(kernel::attention, options.constants, std::vector{qkv}, excluded);
     options.flops =
         4.0 * streams * rows * (64.0 * mask.cols) * heads * head_dim; // an upper bound: masked blocks are skipped

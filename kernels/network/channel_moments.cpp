@@ -20,7 +20,7 @@ Tensor channel_moments(Graph& g, FeatureMap x)
     push.moments_pixels = x.pixels();
     push.moments_image_rows = x.image_rows();
     DispatchOptions options;
-    options.absorbed_as = "kMoments";
+    options.epilogue = "kMoments";
     options.keeps_x = true;
     options.banded = {"X", {"Moments", kImageRowPadding}};
     g.dispatch(kernel::channel_moments, {{"X", x.data}, {"Moments", moments}}, push, threads(chunks * (width / 8)),

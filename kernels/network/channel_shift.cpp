@@ -23,7 +23,7 @@ FeatureMap channel_shift(Graph& g, FeatureMap x, const ChannelShift& shift)
     push.shift_ld = shift.table.ld;
     push.shift_col = shift.col;
     DispatchOptions options;
-    options.absorbed_as = "kShift";
+    options.epilogue = "kShift";
     options.banded = {"X", "Y"};
     g.dispatch(kernel::channel_shift,
                {{"X", x.data}, {"Shift", shift.table}, {"ShiftRow", shift.table_row}, {"Y", y.data}}, push,

@@ -56,7 +56,7 @@ Tensor flash_attention(Graph& g, Tensor q, Tensor kv, const FlashAttentionOption
     DispatchOptions dispatch;
     dispatch.constants = group_constants(g.limits(), {{"kChunks", chunks}, {"kMostChunks", chunks <= 20 ? 20u : 64u}});
     dispatch.flops = 4.0 * o.batch * o.query_rows * o.keys * o.heads * o.head_dim;
-    const uint32_t excluded = o.head_dim > kMostFlashMatrixDim ? kNeedsCooperativeMatrix : 0u;
+    const uint32_t excluded = o.head_dim > kMostFlashMatrixDim ? kFeatureCooperativeMatrix : 0u;
     dispatch.variant = &g.variant(kernel::flash_attention, dispatch.constants, std::vector{q, kv}, excluded);
     const bool on_lanes = dispatch.variant->constant("kLanes");
     const Tile tile = on_lanes ? Tile{kLaneQueries * cpu_lanes(g.limits()), 1} : fixed_tile(*dispatch.variant);

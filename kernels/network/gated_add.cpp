@@ -25,7 +25,7 @@ Tensor gated_add(Graph& g, Tensor x, Modulation gate, Tensor residual, uint32_t 
     push.gate_col = gate.col;
     push.gate_step = gate.step;
     DispatchOptions options;
-    options.absorbed_as = "kGatedAdd";
+    options.epilogue = "kGatedAdd";
     if (groups == 1)
         options.banded = {"X", "GateRow", "Residual", "Y"};
     g.dispatch(kernel::gated_add,

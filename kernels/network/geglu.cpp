@@ -13,7 +13,7 @@ Tensor geglu(Graph& g, Tensor x)
     const Tensor y = g.matrix(x.rows, x.cols / 2, x.dtype, "geglu");
     const GegluPush push{.rows = x.rows, .cols = y.cols, .x_ld = x.ld, .y_ld = y.ld};
     DispatchOptions options;
-    options.absorbed_as = "kGeglu";
+    options.epilogue = "kGeglu";
     options.banded = {"X", "Y"};
     g.dispatch(kernel::geglu, {{"X", x}, {"Y", y}}, push, threads(x.rows * (y.cols / 8)), std::move(options));
     return y;

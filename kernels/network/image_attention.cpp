@@ -16,7 +16,7 @@ bool prefers_products(Graph& g, const FeatureMap& x)
     const DType half = DType::f16;
     const Tensor like_x{.dtype = half};
     const KernelVariant& gemm = g.variant(kernel::gemm, {}, std::vector{like_x, like_x});
-    return x.data.dtype == half && (gemm.needs & kNeedsCooperativeMatrix) &&
+    return x.data.dtype == half && (gemm.features & kFeatureCooperativeMatrix) &&
            x.channels() * dtype_bytes(half) % g.limits().offset_alignment == 0;
 }
 

@@ -65,7 +65,7 @@ std::vector<ConstantValue> constants_of(const MatmulTile& t, const DeviceLimits&
             {"kDown", t.down},
             {"kSubgroups", t.subgroups},
             {"kThreads", t.subgroups * limits.matrix.subgroup},
-            {"kStep", t.step},
+            {"kTileK", t.step},
             {"kStages", t.stages},
             {"kAhead", t.ahead},
             {"kWholeSteps", whole},
@@ -125,7 +125,7 @@ MatmulTiles matmul_tiles(const KernelVariant& variant, const DeviceLimits& limit
 {
     if (variant.constant("kLanes"))
         return lane_tiles(limits, shape);
-    const bool matrices = variant.needs & kNeedsCooperativeMatrix;
+    const bool matrices = variant.features & kFeatureCooperativeMatrix;
     std::vector<RatedTile> tiles =
         matrices ? matrix_tiles(variant, limits, shape) : std::vector(std::begin(kSimtTiles), std::end(kSimtTiles));
     if (wanted && matrices)

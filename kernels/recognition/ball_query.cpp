@@ -21,7 +21,7 @@ Tensor ball_query(Graph& g, Tensor points, Tensor centers, const BallOptions& o)
                              .radius2 = o.radius * o.radius};
     const Tensor index = g.array(centers.rows * o.neighbors, DType::u32, "group members");
     DispatchOptions dispatch;
-    dispatch.most_operations = 12.0 * push.rows * push.count; // no set is full before all points were looked at
+    dispatch.max_flops = 12.0 * push.rows * push.count; // no set is full before all points were looked at
     g.dispatch(kernel::ball_query, {{"Points", points}, {"Centers", centers}, {"Index", index}}, push,
                threads(push.rows), std::move(dispatch));
     return index;

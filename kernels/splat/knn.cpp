@@ -61,7 +61,7 @@ Tensor knn(Graph& g, Tensor points, const KnnOptions& options)
                 {"Neighbors", neighbors}},
                push, threads(sought),
                {.constants = {{"kNeighbors", options.neighbors}, has_labels, {"kQueries", others}},
-                .most_operations = double(sought) * kCandidates * (16 + 6 * options.neighbors)});
+                .max_flops = double(sought) * kCandidates * (16 + 6 * options.neighbors)});
     return neighbors;
 }
 

@@ -134,7 +134,7 @@ Tiled sort_into_tiles(Graph& g, const Seen& seen, const SplatOptions& o, const S
     const SortedPairs pairs = {g.array(push.max_pairs, DType::u32, "pair tiles"),
                                g.array(push.max_pairs, DType::u32, "pair records")};
     DispatchOptions emit = lens;
-    emit.most_operations = 60.0 * push.max_pairs;
+    emit.max_flops = 60.0 * push.max_pairs;
     g.dispatch(kernel::splat_emit,
                {{"Records", seen.records},
                 {"Sources", seen.sources},
@@ -167,7 +167,7 @@ SplatImages splat(Graph& g, const SplatTensors& scene, Tensor cameras, const Spl
                            seen.count,
                            by_tile.pairs};
     DispatchOptions blend;
-    blend.most_operations = 40.0 * push.max_pairs * options.tile * options.tile; // no pixel is done early
+    blend.max_flops = 40.0 * push.max_pairs * options.tile * options.tile; // no pixel is done early
     for (size_t picture = 0; picture < options.made.size(); ++picture)
         blend.constants.push_back({kMade[picture], options.made[picture]});
     const auto grid = [&](const Kernel& kernel) {

@@ -27,7 +27,7 @@ Tensor shade(Graph& g, const TraceScene& scene, Tensor view, const ShadeOptions&
     const Tensor surfaces = g.array(pixels, DType::u32, "surfaces", 4);
     DispatchOptions dispatch;
     dispatch.banded = {"Light", "Ambient", "Surfaces"};
-    dispatch.most_operations = double(pixels) * options.samples * (2.5 + options.ambient_rays) * kOperationsPerRay;
+    dispatch.max_flops = double(pixels) * options.samples * (2.5 + options.ambient_rays) * kOperationsPerRay;
     g.dispatch(kernel::shade,
                {{"Nodes", scene.nodes},
                 {"Triangles", scene.triangles},

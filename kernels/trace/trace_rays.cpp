@@ -15,7 +15,7 @@ Tensor trace_rays(Graph& g, const TraceScene& scene, Tensor rays, bool any)
     DispatchOptions options;
     options.constants = {{"kAny", any}};
     options.banded = {"Rays", "Hits"};
-    options.most_operations = rays.rows * kOperationsPerRay;
+    options.max_flops = rays.rows * kOperationsPerRay;
     g.dispatch(kernel::trace_rays,
                {{"Nodes", scene.nodes}, {"Triangles", scene.triangles}, {"Rays", rays}, {"Hits", hits}}, push,
                threads(rays.rows), std::move(options));

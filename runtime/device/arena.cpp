@@ -30,7 +30,7 @@ Result<std::shared_ptr<const Arena>> Arena::create(Device& device, const ArenaSi
 }
 
 // transients become memory of the caller's, as slots are
-Result<std::unique_ptr<Program>> Arena::program(const Graph& graph) const
+Result<std::unique_ptr<Executable>> Arena::executable(const Graph& graph) const
 {
     SR_TRY(Plan plan, make_plan(graph, device_.costs()));
     for (size_t i = 0; i < plan.resources.size(); ++i) {
@@ -44,7 +44,7 @@ Result<std::unique_ptr<Program>> Arena::program(const Graph& graph) const
         r.memory = {blocks_[p.block].get(), p.offset, blocks_[p.block]->bytes() - p.offset};
     }
     plan.blocks.clear();
-    return Program::create(device_, std::move(plan));
+    return Executable::create(device_, std::move(plan));
 }
 
 } // namespace semrover

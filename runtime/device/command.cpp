@@ -25,7 +25,7 @@ constexpr VkAccessFlags kAnything = VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY
 
 // what a copy needs an image of the application's to be
 struct ImageTransfer {
-    const HostImage& image;
+    const ExternalImage& image;
     VkImageLayout layout;
     VkAccessFlags access;
 };
@@ -98,8 +98,8 @@ void record_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from,
             kShader | kCopy | VK_ACCESS_HOST_READ_BIT);
 }
 
-void record_host_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to,
-                      uint64_t to_at, uint64_t bytes)
+void record_external_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to,
+                          uint64_t to_at, uint64_t bytes)
 {
     barrier(vk, commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, kAnything, kTransfer,
             kCopy); // what the application did with it
@@ -110,7 +110,7 @@ void record_host_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer 
 }
 
 void record_image_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from, uint64_t from_at,
-                       const HostImage& to)
+                       const ExternalImage& to)
 {
     const ImageTransfer transfer{to, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_ACCESS_TRANSFER_WRITE_BIT};
     begin_transfer(vk, commands, transfer);
@@ -119,7 +119,7 @@ void record_image_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer
     end_transfer(vk, commands, transfer, VK_ACCESS_TRANSFER_WRITE_BIT);
 }
 
-void record_image_fetch(const VulkanCalls& vk, VkCommandBuffer commands, const HostImage& from, VkBuffer to,
+void record_image_fetch(const VulkanCalls& vk, VkCommandBuffer commands, const ExternalImage& from, VkBuffer to,
                         uint64_t to_at)
 {
     // what was read of the buffer before, too

@@ -21,19 +21,19 @@ void record_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from,
                  uint64_t to_at, uint64_t bytes);
 // Into memory that belongs to an application: everything that follows in the queue may use it. An image has one level
 // and one layer, and comes in one layout and goes in another; its whole content is replaced.
-void record_host_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to,
-                      uint64_t to_at, uint64_t bytes);
-struct HostImage {
+void record_external_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from, uint64_t from_at, VkBuffer to,
+                          uint64_t to_at, uint64_t bytes);
+struct ExternalImage {
     VkImage image = VK_NULL_HANDLE;
     uint32_t width = 0, height = 0;
     VkImageLayout before = VK_IMAGE_LAYOUT_UNDEFINED, after = VK_IMAGE_LAYOUT_GENERAL;
     VkImageAspectFlags aspect = VK_IMAGE_ASPECT_COLOR_BIT;
 };
 // the other way: row by row. `before` is not UNDEFINED
-void record_image_fetch(const VulkanCalls& vk, VkCommandBuffer commands, const HostImage& from, VkBuffer to,
+void record_image_fetch(const VulkanCalls& vk, VkCommandBuffer commands, const ExternalImage& from, VkBuffer to,
                         uint64_t to_at);
 void record_image_copy(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer from, uint64_t from_at,
-                       const HostImage& to);
+                       const ExternalImage& to);
 // into a command buffer of the application's: what follows may use everything that came before, in the queue too
 void record_entry_barrier(const VulkanCalls& vk, VkCommandBuffer commands);
 // and out of it: everything that follows may use what was copied and filled
@@ -44,7 +44,8 @@ void record_fill(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer buffe
 // bytes of the command itself: a multiple of 4; with the barrier that lets shaders follow
 void record_update(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer to, uint64_t at,
                    std::span<const std::byte> bytes);
-// a buffer goes to another API (MemoryKind::shared), with all that was written to it; what overwrites it takes it back
+// a buffer goes to another API (MemoryKind::exportable), with all that was written to it; what overwrites it takes it
+// back
 void record_share(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer buffer, uint32_t queue_family);
 void record_clear(const VulkanCalls& vk, VkCommandBuffer commands, VkBuffer buffer, uint64_t at, uint64_t bytes);
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "runtime/device/command_ring.h"
-#include "runtime/device/state.h"
+#include "runtime/device/tensor_pool.h"
 
 namespace semrover {
 
@@ -15,7 +15,7 @@ class CopyRing {
 
     // between slots, or a slot and staging; of equal size. The ticket is for Device::wait.
     Result<uint64_t> copy(const BufferSlice& from, const BufferSlice& to);
-    Result<uint64_t> copy(const Slot& from, const Slot& to) { return copy(from.slice(), to.slice()); }
+    Result<uint64_t> copy(const DeviceTensor& from, const DeviceTensor& to) { return copy(from.slice(), to.slice()); }
 
   private:
     explicit CopyRing(Device& device) : device_(device) {}

@@ -7,11 +7,11 @@
 #include "runtime/device/cooperative_matrix.h"
 #include "runtime/device/device_choice.h"
 #include "runtime/device/device_fault.h"
+#include "runtime/device/exportable.h"
 #include "runtime/device/physical_device.h"
 #include "runtime/device/pipeline.h"
 #include "runtime/device/pipeline_statistics.h"
 #include "runtime/device/profile.h"
-#include "runtime/device/sharing.h"
 #include "runtime/device/staging.h"
 #include "runtime/graph/kernel.h"
 
@@ -79,49 +79,50 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceOptions& options)
     return d;
 }
 
-Result<std::unique_ptr<Device>> Device::adopt(const HostDevice& host, const DeviceOptions& options)
+Result<std::unique_ptr<Device>> Device::adopt(const ExternalDevice& external, const DeviceOptions& options)
 {
-    if (!host.instance || !host.physical || !host.device || !host.queue)
+    if (!external.instance || !external.physical || !external.device || !external.queue)
         return fail(ErrorCode::usage,
                     "a device of the application's needs instance, physical device, device and queue");
     std::unique_ptr<Device> d(new Device());
     d->owned_ = false;
     d->take_allocation(options);
-    SR_CHECK(d->vk_.load_instance(host.get_instance_proc_addr, host.instance));
-    SR_CHECK(d->vk_.load_device(host.device));
+    SR_CHECK(d->vk_.load_instance(external.get_instance_proc_addr, external.instance));
+    SR_CHECK(d->vk_.load_device(external.device));
     d->vk_.SetDebugUtilsObjectNameEXT = nullptr; // the application does not say whether it enabled debug names
     d->vk_.CmdBeginDebugUtilsLabelEXT = nullptr;
     d->vk_.CmdEndDebugUtilsLabelEXT = nullptr;
-    if (!is_compute_family(d->vk_, host.physical, host.queue_family))
-        return fail(ErrorCode::usage, "queue family {} of the application's device has no compute", host.queue_family);
-    if (host.work_queue && !is_compute_family(d->vk_, host.physical, host.work_queue_family))
+    if (!is_compute_family(d->vk_, external.physical, external.queue_family))
+        return fail(ErrorCode::usage, "queue family {} of the application's device has no compute",
+                    external.queue_family);
+    if (external.work_queue && !is_compute_family(d->vk_, external.physical, external.work_queue_family))
         return fail(ErrorCode::usage, "family {} of the work queue of the application's device has no compute",
-                    host.work_queue_family);
-    if (!host.robust_buffer_access && !host.pipeline_robustness)
+                    external.work_queue_family);
+    if (!external.robust_buffer_access && !external.pipeline_robustness)
         return fail(ErrorCode::usage, "a device of the application's needs robustBufferAccess or pipelineRobustness, "
                                       "and to say so: files decide what shaders read");
-    if (host.cooperative_matrix && !host.float16)
+    if (external.cooperative_matrix && !external.float16)
         return fail(ErrorCode::usage, "a device with cooperative matrices needs shaderFloat16, and to say so");
-    if (bool(host.lock) != bool(host.unlock))
+    if (bool(external.lock) != bool(external.unlock))
         return fail(ErrorCode::usage, "a device of the application's needs both of lock and unlock, or neither");
-    if (bool(host.memory.allocate) != bool(host.memory.release))
+    if (bool(external.memory.allocate) != bool(external.memory.release))
         return fail(ErrorCode::usage,
                     "a device of the application's needs both of allocate_memory and free_memory, or neither");
-    d->instance_ = host.instance;
-    d->physical_ = host.physical;
-    d->device_ = host.device;
-    d->queue_ = d->beside_ = {host.queue, host.queue_family, host.lock, host.unlock};
-    if (host.work_queue)
-        d->queue_ = {host.work_queue, host.work_queue_family};
-    d->memory_source_ = host.memory;
-    d->sharing_ = host.sharing;
-    d->pipeline_robustness_ = host.pipeline_robustness;
+    d->instance_ = external.instance;
+    d->physical_ = external.physical;
+    d->device_ = external.device;
+    d->queue_ = d->beside_ = {external.queue, external.queue_family, external.lock, external.unlock};
+    if (external.work_queue)
+        d->queue_ = {external.work_queue, external.work_queue_family};
+    d->memory_source_ = external.memory;
+    d->exportable_ = external.exportable;
+    d->pipeline_robustness_ = external.pipeline_robustness;
     SR_CHECK(d->finish(options));
-    // what the hardware could do is not what the host asked for
-    if (!host.cooperative_matrix)
-        d->limits_.needs_supported &= ~uint32_t(kNeedsCooperativeMatrix);
-    if (!host.float16)
-        d->limits_.needs_supported &= ~uint32_t(kNeedsFloat16);
+    // what the hardware could do is not what the application enabled
+    if (!external.cooperative_matrix)
+        d->limits_.features &= ~uint32_t(kFeatureCooperativeMatrix);
+    if (!external.float16)
+        d->limits_.features &= ~uint32_t(kFeatureFloat16);
     return d;
 }
 
@@ -174,10 +175,10 @@ Status Device::create_device(const DeviceOptions& options, bool matrices)
     if (has_extension(vk_, physical_, "VK_KHR_portability_subset")) // must be enabled where there is one: MoltenVK's
         extensions.push_back("VK_KHR_portability_subset");
     if (options.share_by_fd) {
-        sharing_ = sharing_of(vk_, physical_);
-        if (sharing_.memory)
+        exportable_ = exportable_of(vk_, physical_);
+        if (exportable_.memory)
             extensions.push_back(VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME);
-        if (sharing_.semaphores)
+        if (exportable_.semaphores)
             extensions.push_back(VK_KHR_EXTERNAL_SEMAPHORE_FD_EXTENSION_NAME);
     }
     auto faults = vk_struct<VkPhysicalDeviceFaultFeaturesEXT>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FAULT_FEATURES_EXT);
@@ -235,9 +236,9 @@ Status Device::finish(const DeviceOptions& options)
     name_ = summary.name;
     driver_ = summary.driver;
     limits_ = summary.limits;
-    const Sharing can = sharing_of(vk_, physical_); // a host may have enabled what cannot be exported
-    sharing_.memory = sharing_.memory && can.memory && vk_.GetMemoryFdKHR;
-    sharing_.semaphores = sharing_.semaphores && can.semaphores && vk_.GetSemaphoreFdKHR;
+    const Exportable can = exportable_of(vk_, physical_); // an application may have enabled what cannot be exported
+    exportable_.memory = exportable_.memory && can.memory && vk_.GetMemoryFdKHR;
+    exportable_.semaphores = exportable_.semaphores && can.semaphores && vk_.GetSemaphoreFdKHR;
     budget_ = options.max_bytes;
     cancelled_ = options.cancelled;
     autotunes_ = options.autotune;
@@ -267,7 +268,7 @@ Result<std::unique_ptr<Device>> Device::beside(Device& first)
     d->beside_ = first.queue_;
     d->families_ = first.families_;
     d->index_ = first.index_;
-    d->sharing_ = first.sharing_;
+    d->exportable_ = first.exportable_;
     d->pipeline_robustness_ = first.pipeline_robustness_;
     d->pipeline_statistics_ = first.pipeline_statistics_;
     d->memory_source_ = first.memory_source_;

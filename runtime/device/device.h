@@ -36,19 +36,20 @@ struct DeviceOptions {
     std::span<const std::byte> pipeline_cache = {};
     // for every Vulkan object, read while the device is made; null: the driver's own
     const VkAllocationCallbacks* allocation = nullptr;
-    bool autotune = true;     // programs try alternatives in their first runs, where a device has a watchdog
+    bool autotune = true;             // executables try alternatives in their first runs, where a device has a watchdog
     bool pipeline_statistics = false; // pipelines keep what the driver says of their code, where it does, for a Profile
-    bool share_by_fd = false; // enables what Sharing needs, where there is it; an application's device says what it has
+    bool share_by_fd =
+        false; // enables what Exportable needs, where there is it; an application's device says what it has
 };
 
 // what other APIs can be given by file descriptor
-struct Sharing {
+struct Exportable {
     bool memory = false, semaphores = false;
 };
 
-// A device that belongs to the host program; it outlives the engine. No file is kept and no variable of the environment
+// A device that belongs to the application; it outlives the engine. No file is kept and no variable of the environment
 // read for it.
-struct HostDevice {
+struct ExternalDevice {
     PFN_vkGetInstanceProcAddr get_instance_proc_addr = nullptr; // its way to Vulkan; null: the loader's
     VkInstance instance = VK_NULL_HANDLE;
     VkPhysicalDevice physical = VK_NULL_HANDLE;
@@ -63,7 +64,7 @@ struct HostDevice {
     bool float16 = false;                         // shaderFloat16 is enabled too
     bool cooperative_matrix = false;              // and MatrixFeatures, with the memory model for all of the device
     std::function<void()> lock = {}, unlock = {}; // around every use of `queue`; may be empty
-    Sharing sharing = {};                         // its extensions are enabled
+    Exportable exportable = {};                   // its extensions are enabled
     MemorySource memory = {};                     // instead of vkAllocateMemory
 };
 
@@ -105,7 +106,7 @@ struct DeviceSummary {
 class Device {
   public:
     static Result<std::unique_ptr<Device>> create(const DeviceOptions& options);
-    static Result<std::unique_ptr<Device>> adopt(const HostDevice& host, const DeviceOptions& options);
+    static Result<std::unique_ptr<Device>> adopt(const ExternalDevice& external, const DeviceOptions& options);
     // The same device for another thread: with tickets, copies and pipelines of its own, on the application's `queue`.
     // What is allocated counts together, and one may read the other's memory. `first` outlives it.
     static Result<std::unique_ptr<Device>> beside(Device& first);
@@ -128,7 +129,7 @@ class Device {
     // of all queues that use its memory: one, or two
     const std::vector<uint32_t>& families() const { return families_; }
     double timestamp_ns() const { return timestamp_ns_; } // of a unit; 0: the queue has none
-    const Sharing& sharing() const { return sharing_; }
+    const Exportable& exportable() const { return exportable_; }
     const MemorySource& memory_source() const { return memory_source_; }
     CostModel& costs() { return costs_; }
     TuningCache& tuning() { return tuning_; } // kept with the pipeline cache
@@ -137,9 +138,9 @@ class Device {
 
     // synchronous copies, after everything submitted so far; through staging where the host cannot see the memory
     Status write(const BufferSlice& to, std::span<const std::byte> bytes);
-    // The same piecewise, for memory that nothing has used yet: where the caller puts all of `to`, of most_room() bytes at
-    // most, until the next call. Waits for nothing but room; finish_writes() for all of it. drop_writes(): what was put
-    // and not finished is not written.
+    // The same piecewise, for memory that nothing has used yet: where the caller puts all of `to`, of most_room() bytes
+    // at most, until the next call. Waits for nothing but room; finish_writes() for all of it. drop_writes(): what was
+    // put and not finished is not written.
     Result<std::span<std::byte>> room(const BufferSlice& to);
     uint64_t most_room() const;
     Status finish_writes();
@@ -203,7 +204,7 @@ class Device {
     bool owned_ = true;
     bool pipeline_robustness_ = false;
     bool pipeline_statistics_ = false;
-    Sharing sharing_;
+    Exportable exportable_;
     MemorySource memory_source_;
     std::function<bool()> cancelled_;
     VkSemaphore timeline_ = VK_NULL_HANDLE;

@@ -4,7 +4,7 @@
 
 #include "runtime/device/debug_names.h"
 #include "runtime/device/device.h"
-#include "runtime/device/sharing.h"
+#include "runtime/device/exportable.h"
 
 namespace semrover {
 
@@ -40,7 +40,7 @@ Result<std::unique_ptr<Buffer>> Buffer::create(Device& device, uint64_t bytes, M
                     bytes, device.limits().max_allocation);
     std::unique_ptr<Buffer> b(new Buffer(device));
     b->bytes_ = round_up64(std::max<uint64_t>(bytes, 1), device.limits().offset_alignment);
-    b->shared_ = kind == MemoryKind::shared;
+    b->exportable_ = kind == MemoryKind::exportable;
     SR_CHECK(b->make_handle(kind));
     SR_CHECK(b->make_memory(kind, name));
     name_object(device.vk(), device.handle(), VK_OBJECT_TYPE_BUFFER, reinterpret_cast<uint64_t>(b->buffer_), name);
@@ -51,18 +51,18 @@ Status Buffer::make_handle(MemoryKind kind)
 {
     auto external = vk_struct<VkExternalMemoryBufferCreateInfo>(VK_STRUCTURE_TYPE_EXTERNAL_MEMORY_BUFFER_CREATE_INFO);
     external.handleTypes = VK_EXTERNAL_MEMORY_HANDLE_TYPE_OPAQUE_FD_BIT;
-    auto info = vk_struct<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO, shared_ ? &external : nullptr);
+    auto info = vk_struct<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO, exportable_ ? &external : nullptr);
     info.size = bytes_;
-    info.usage = shared_ ? kSharedUsage : VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+    info.usage = exportable_ ? kExportedUsage : VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
     if (kind == MemoryKind::device)
         info.usage |= VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT;
-    if (device_.families().size() > 1 && !shared_) {
+    if (device_.families().size() > 1 && !exportable_) {
         info.sharingMode = VK_SHARING_MODE_CONCURRENT;
         info.queueFamilyIndexCount = uint32_t(device_.families().size());
         info.pQueueFamilyIndices = device_.families().data();
     }
     SR_VK(device_.vk().CreateBuffer(device_.handle(), &info, device_.vk().allocator(), &buffer_));
-    dedicated_ = shared_ && needs_dedicated_memory(device_);
+    dedicated_ = exportable_ && needs_dedicated_memory(device_);
     return {};
 }
 
@@ -88,7 +88,7 @@ Status Buffer::make_memory(MemoryKind kind, const char* name)
     const bool seen = direct && (has & kHostSees) == kHostSees;
     // staging is read as it is, where no cached memory is to be had
     cached_ = staging || has & VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
-    const bool borrowed = device_.memory_source().allocate && !shared_; // an exported allocation is made for it
+    const bool borrowed = device_.memory_source().allocate && !exportable_; // an exported allocation is made for it
     return borrowed ? borrow(needs, uint32_t(type), seen, name) : allocate(needs, uint32_t(type), seen, name);
 }
 
@@ -99,7 +99,8 @@ Status Buffer::allocate(const VkMemoryRequirements& needs, uint32_t type, bool s
     auto exported = vk_struct<VkExportMemoryAllocateInfo>(VK_STRUCTURE_TYPE_EXPORT_MEMORY_ALLOCATE_INFO,
                                                           dedicated_ ? &alone : nullptr);
     exported.handleTypes = VK_EXTERNAL_MEMORY_HANDLE_TYPE_OPAQUE_FD_BIT;
-    auto info = vk_struct<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, shared_ ? &exported : nullptr);
+    auto info =
+        vk_struct<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, exportable_ ? &exported : nullptr);
     info.allocationSize = memory_bytes_ = needs.size;
     info.memoryTypeIndex = type;
     const VulkanCalls& vk = device_.vk();
@@ -131,7 +132,7 @@ Status Buffer::borrow(const VkMemoryRequirements& needs, uint32_t type, bool see
 
 Result<int> Buffer::descriptor() const
 {
-    SR_ASSERT(shared_, "a descriptor of memory that is not shared");
+    SR_ASSERT(exportable_, "a descriptor of memory that is not shared");
     auto info = vk_struct<VkMemoryGetFdInfoKHR>(VK_STRUCTURE_TYPE_MEMORY_GET_FD_INFO_KHR);
     info.memory = memory_;
     info.handleType = VK_EXTERNAL_MEMORY_HANDLE_TYPE_OPAQUE_FD_BIT;

@@ -17,8 +17,8 @@ class Device;
 
 // device: what kernels read and write. staging: what the host sees, and copies pass through. transfer: staging that the
 // budget (--max-vram) does not count, as no plan has it: the device's one window of 16 MiB, where it needs any.
-// shared: what another API sees, too (Device::sharing); only copied to and from.
-enum class MemoryKind : uint8_t { device, staging, transfer, shared };
+// exportable: what another API sees, too (Device::exportable); only copied to and from.
+enum class MemoryKind : uint8_t { device, staging, transfer, exportable };
 
 // memory of an application's allocator
 struct MemoryRequest {
@@ -53,7 +53,7 @@ class Buffer {
     bool cached() const { return cached_; }       // the host's reads are cached: else they are slow
     BufferSlice slice() const { return {this, 0, bytes_}; }
 
-    // of MemoryKind::shared: a new file descriptor of the memory, which the caller owns; its size; whether whoever
+    // of MemoryKind::exportable: a new file descriptor of the memory, which the caller owns; its size; whether whoever
     // imports it must be told that the memory is this buffer's alone
     Result<int> descriptor() const;
     uint64_t memory_bytes() const { return memory_bytes_; }
@@ -70,10 +70,10 @@ class Buffer {
     Device& device_;
     VkBuffer buffer_ = VK_NULL_HANDLE;
     VkDeviceMemory memory_ = VK_NULL_HANDLE; // our own, or
-    MemoryPiece piece_;                      // the host allocator's
+    MemoryPiece piece_;                      // the application allocator's
     uint64_t bytes_ = 0, memory_bytes_ = 0, accounted_ = 0;
     std::byte* mapped_ = nullptr;
-    bool cached_ = false, shared_ = false, dedicated_ = false;
+    bool cached_ = false, exportable_ = false, dedicated_ = false;
 };
 
 } // namespace semrover

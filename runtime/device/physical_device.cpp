@@ -14,9 +14,9 @@ namespace semrover {
 namespace {
 
 // reported by `devices`; used where a kernel variant asks for them
-constexpr const char* kOptionalExtensions[] = {"VK_KHR_cooperative_matrix", "VK_NV_cooperative_matrix2",
+constexpr const char* kOptionalExtensions[] = {"VK_KHR_cooperative_matrix",    "VK_NV_cooperative_matrix2",
                                                "VK_EXT_subgroup_size_control", "VK_EXT_memory_budget",
-                                               "VK_EXT_device_fault", "VK_KHR_pipeline_executable_properties"};
+                                               "VK_EXT_device_fault",          "VK_KHR_pipeline_executable_properties"};
 
 DeviceType device_type(VkPhysicalDeviceType type)
 {
@@ -47,24 +47,23 @@ int rank(DeviceType type)
     return 4;
 }
 
-uint32_t supported_needs(const VulkanCalls& vk, VkPhysicalDevice physical,
-                         const VkPhysicalDeviceVulkan11Properties& p11)
+uint32_t features_of(const VulkanCalls& vk, VkPhysicalDevice physical, const VkPhysicalDeviceVulkan11Properties& p11)
 {
     auto f12 = vk_struct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
     auto features = vk_struct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &f12);
     vk.GetPhysicalDeviceFeatures2(physical, &features);
-    uint32_t needs = 0;
+    uint32_t found = 0;
     if (p11.subgroupSupportedStages & VK_SHADER_STAGE_COMPUTE_BIT) {
         if (p11.subgroupSupportedOperations & VK_SUBGROUP_FEATURE_ARITHMETIC_BIT)
-            needs |= kNeedsSubgroupArithmetic;
+            found |= kFeatureSubgroupArithmetic;
         if (p11.subgroupSupportedOperations & VK_SUBGROUP_FEATURE_BALLOT_BIT)
-            needs |= kNeedsSubgroupBallot;
+            found |= kFeatureSubgroupBallot;
         if (p11.subgroupSupportedOperations & VK_SUBGROUP_FEATURE_SHUFFLE_BIT)
-            needs |= kNeedsSubgroupShuffle;
+            found |= kFeatureSubgroupShuffle;
         if (p11.subgroupSupportedOperations & VK_SUBGROUP_FEATURE_VOTE_BIT)
-            needs |= kNeedsSubgroupVote;
+            found |= kFeatureSubgroupVote;
     }
-    return f12.shaderFloat16 ? needs | kNeedsFloat16 : needs;
+    return f12.shaderFloat16 ? found | kFeatureFloat16 : found;
 }
 
 DeviceLimits limits_of(const VulkanCalls& vk, VkPhysicalDevice physical, const VkPhysicalDeviceProperties& p,
@@ -74,7 +73,7 @@ DeviceLimits limits_of(const VulkanCalls& vk, VkPhysicalDevice physical, const V
     DeviceLimits l;
     l.type = device_type(p.deviceType);
     l.subgroup_size = p11.subgroupSize;
-    l.needs_supported = supported_needs(vk, physical, p11);
+    l.features = features_of(vk, physical, p11);
     l.max_shared_bytes = v.maxComputeSharedMemorySize;
     l.max_group_threads = v.maxComputeWorkGroupInvocations;
     l.max_groups =
@@ -323,9 +322,9 @@ DeviceSummary summarize(const VulkanCalls& vk, VkInstance instance, VkPhysicalDe
     if (const uint32_t units = compute_units(vk, physical))
         s.limits.compute_units = units;
     if (s.limits.matrix.m)
-        s.limits.needs_supported |= kNeedsCooperativeMatrix;
+        s.limits.features |= kFeatureCooperativeMatrix;
     if (s.limits.matrix.half_sums)
-        s.limits.needs_supported |= kNeedsHalfSums;
+        s.limits.features |= kFeatureHalfSums;
     VkPhysicalDeviceMemoryProperties memory;
     vk.GetPhysicalDeviceMemoryProperties(physical, &memory);
     for (uint32_t i = 0; i < memory.memoryHeapCount; ++i)

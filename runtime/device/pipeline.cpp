@@ -294,7 +294,7 @@ Status PipelineStore::make(Missing& m) const
     auto subgroup = vk_struct<VkPipelineShaderStageRequiredSubgroupSizeCreateInfo>(
         VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_REQUIRED_SUBGROUP_SIZE_CREATE_INFO);
     subgroup.requiredSubgroupSize = device_.limits().matrix.subgroup;
-    const bool matrices = variant.needs & kNeedsCooperativeMatrix;
+    const bool matrices = variant.features & kFeatureCooperativeMatrix;
     const VkSpecializationInfo specialization{uint32_t(entries.size()), entries.data(), values.size() * 4,
                                               values.data()};
     auto info = vk_struct<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);

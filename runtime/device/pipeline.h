@@ -30,10 +30,10 @@ struct Pipeline {
     std::shared_ptr<const std::vector<Statistic>> statistics; // null where the device does not capture them
 };
 
-// Compute pipelines by (variant, constants), made when a program needs them, over a VkPipelineCache kept on disk in
+// Compute pipelines by (variant, constants), made when an executable needs them, over a VkPipelineCache kept on disk in
 // $XDG_CACHE_HOME/semrover (safe to delete; a file of another driver is ignored). It is saved as pipelines are made: a
 // run that is killed, or whose device is lost, leaves what it compiled to the next. The alternatives that the device's
-// programs chose (TuningCache) are kept with it.
+// executables chose (TuningCache) are kept with it.
 class PipelineStore {
   public:
     // blob: of an earlier process, in place of the file; with an application's device there is no file either way

@@ -20,7 +20,7 @@ uint64_t ReadbackRing::planned_bytes(const DeviceLimits& limits, uint64_t bytes,
     return count * round_up64(std::max<uint64_t>(bytes, 1), limits.offset_alignment);
 }
 
-Status ReadbackRing::read(const Slot& slot, Sink sink)
+Status ReadbackRing::read(const DeviceTensor& slot, Sink sink)
 {
     const BufferSlice from = slot.slice();
     SR_ASSERT(from.bytes <= staging_[0]->bytes(), "'{}' of {} bytes read through {}", slot.name(), from.bytes,

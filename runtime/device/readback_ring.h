@@ -20,7 +20,7 @@ class ReadbackRing {
     static uint64_t planned_bytes(const DeviceLimits& limits, uint64_t bytes, size_t count = 3);
 
     // as the slot is after everything submitted so far; waits for the oldest read if there is no room
-    Status read(const Slot& slot, Sink sink);
+    Status read(const DeviceTensor& slot, Sink sink);
     Status poll();  // sinks of what has arrived
     Status drain(); // of all, waiting for it
     size_t pending() const { return reads_.size(); }

@@ -33,7 +33,7 @@ std::optional<T> number(std::string_view text, int base)
     return value;
 }
 
-constexpr size_t kTurns = 2;      // of each alternative: the first run of a program finds caches cold and clocks low
+constexpr size_t kTurns = 2; // of each alternative: the first run of an executable finds caches cold and clocks low
 constexpr double kClearly = 0.97; // of the time of the first one, below which another one is taken
 
 } // namespace

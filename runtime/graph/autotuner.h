@@ -12,8 +12,8 @@
 
 namespace semrover {
 
-// Which of their alternatives passes ran fastest with, as programs have measured it on a device. All of a pass give the
-// same bits.
+// Which of their alternatives passes ran fastest with, as executables have measured it on a device. All of a pass give
+// the same bits.
 class TuningCache {
   public:
     // of passes that take alike: their shader, its constants, their alternatives, the output, the bytes that they bind
@@ -31,7 +31,7 @@ class TuningCache {
     std::map<Key, uint32_t> best_;
 };
 
-// The first runs of a program are made with each alternative in turn, twice, where its passes have a choice and
+// The first runs of an executable are made with each alternative in turn, twice, where its passes have a choice and
 // nothing is known of them; from then on they keep what was fastest. Runs give the same bits meanwhile.
 class Autotuner {
   public:

@@ -21,7 +21,7 @@ double estimated_seconds(const Pass& pass)
     double bytes = 0;
     for (const PassBinding& b : pass.bindings)
         bytes += double(b.bytes);
-    return std::max(std::max(pass.options.flops, pass.options.most_operations) / kSlowOperations, bytes / kSlowBytes);
+    return std::max(std::max(pass.options.flops, pass.options.max_flops) / kSlowOperations, bytes / kSlowBytes);
 }
 
 void CostModel::learn(const Pass& pass, double seconds)
@@ -40,7 +40,7 @@ double CostModel::seconds(const Pass& pass) const
     if (found == measured_.end() || found->second.estimated <= 0)
         return estimated;
     // where the data decides, the next data may have all that there can be
-    const double least = pass.options.most_operations > 0 ? 1 : kLeastRatio;
+    const double least = pass.options.max_flops > 0 ? 1 : kLeastRatio;
     return estimated * std::max(found->second.seconds / found->second.estimated, least);
 }
 

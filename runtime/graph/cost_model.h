@@ -13,7 +13,7 @@ namespace semrover {
 // submits under a watchdog.
 double estimated_seconds(const Pass& pass);
 
-// How long the passes of a device take, beside what was estimated, by shader: what programs have measured so far.
+// How long the passes of a device take, beside what was estimated, by shader: what executables have measured so far.
 class CostModel {
   public:
     // a pass took that long

@@ -33,7 +33,7 @@ Tensor Graph::external(const BufferSlice& memory, uint32_t rows, uint32_t cols, 
     return t;
 }
 
-uint32_t Graph::outside(const void* owner, uint32_t item, const BufferSlice& memory, std::string_view name)
+uint32_t Graph::resource_of(const void* owner, uint32_t item, const BufferSlice& memory, std::string_view name)
 {
     const auto [at, fresh] = owned_.try_emplace({owner, item}, uint32_t(resources_.size()));
     if (fresh)

@@ -12,10 +12,10 @@
 #include <vector>
 
 // A graph of dispatches over lazy tensors. Built once per (model, shape, batch), compiled by named stages over plain
-// data (plan.h), then replayed (program.h). Nothing here touches Vulkan.
+// data (plan.h), then replayed (executable.h). Nothing here touches Vulkan.
 namespace semrover {
 
-class Slot;
+class DeviceTensor;
 
 struct Resource {
     std::string name; // a label, never a key
@@ -58,7 +58,7 @@ class Graph {
     }
 
     // The variant of a kernel that this device runs with these constants and tensors (of as many bindings as are
-    // given), for an op whose grid depends on it; `excluded`: KernelNeeds of variants that do not suit its shape.
+    // given), for an op whose grid depends on it; `excluded`: KernelFeatures of variants that do not suit its shape.
     const KernelVariant& variant(const Kernel& kernel, std::span<const ConstantValue> constants = {},
                                  std::span<const Tensor> tensors = {}, uint32_t excluded = 0);
 
@@ -66,14 +66,14 @@ class Graph {
     // the same shape and row length. `made` and views of it go on being good and lie there too. What reads the memory's
     // old contents must be in the graph before the pass that makes `made`.
     Tensor keep(Tensor made, Tensor memory);
-    Tensor keep(Tensor made, const Slot& slot);
+    Tensor keep(Tensor made, const DeviceTensor& slot);
 
     // Passes run in the order in which they are added, also where they could run side by side: halves of the work that
     // follow each other then share their memory.
     void keep_order() { in_order_ = true; }
 
-    // the resource of a piece of memory that has an owner: the same one every time (Slot::in)
-    uint32_t outside(const void* owner, uint32_t item, const BufferSlice& memory, std::string_view name);
+    // the resource of a piece of memory that has an owner: the same one every time (DeviceTensor::in)
+    uint32_t resource_of(const void* owner, uint32_t item, const BufferSlice& memory, std::string_view name);
 
     const DeviceLimits& limits() const { return limits_; }
     const std::vector<Resource>& resources() const { return resources_; }

@@ -32,14 +32,14 @@ struct PushMember {
     uint32_t offset; // bytes
 };
 
-enum KernelNeeds : uint32_t {
-    kNeedsSubgroupArithmetic = 1, // subgroup reductions and scans
-    kNeedsSubgroupBallot = 2,
-    kNeedsSubgroupShuffle = 4,
-    kNeedsFloat16 = 8, // fp16 arithmetic (storage is always packed into 32-bit words and needs nothing)
-    kNeedsCooperativeMatrix = 16,
-    kNeedsHalfSums = 32, // cooperative matrices with fp16 sums, too
-    kNeedsSubgroupVote = 64,
+enum KernelFeatures : uint32_t {
+    kFeatureSubgroupArithmetic = 1, // subgroup reductions and scans
+    kFeatureSubgroupBallot = 2,
+    kFeatureSubgroupShuffle = 4,
+    kFeatureFloat16 = 8, // fp16 arithmetic (storage is always packed into 32-bit words and needs nothing)
+    kFeatureCooperativeMatrix = 16,
+    kFeatureHalfSums = 32, // cooperative matrices with fp16 sums, too
+    kFeatureSubgroupVote = 64,
 };
 
 struct KernelVariant {
@@ -51,7 +51,7 @@ struct KernelVariant {
     uint32_t push_bytes;
     uint32_t local_size[3];
     uint32_t (*shared_bytes)(const uint32_t* values); // of shared memory, for values in the order of `constants`
-    uint32_t needs;                                   // KernelNeeds
+    uint32_t features;                                // KernelFeatures
 
     const ConstantInfo* constant(std::string_view constant_name) const
     {

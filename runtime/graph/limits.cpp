@@ -44,18 +44,18 @@ Status apply(DeviceLimits& limits, const std::string& key, const std::string& te
         return lower(limits.max_storage_buffers, key, value);
     if (key == "fp16") {
         if (value == 0)
-            limits.needs_supported &= ~uint32_t(kNeedsFloat16 | kNeedsCooperativeMatrix);
+            limits.features &= ~uint32_t(kFeatureFloat16 | kFeatureCooperativeMatrix);
         return {};
     }
     if (key == "coopmat") {
         if (value == 0)
-            limits.needs_supported &= ~uint32_t(kNeedsCooperativeMatrix);
+            limits.features &= ~uint32_t(kFeatureCooperativeMatrix);
         return {};
     }
     if (key == "subgroups") {
         if (value == 0)
-            limits.needs_supported &=
-                ~uint32_t(kNeedsSubgroupArithmetic | kNeedsSubgroupBallot | kNeedsSubgroupShuffle | kNeedsSubgroupVote);
+            limits.features &= ~uint32_t(kFeatureSubgroupArithmetic | kFeatureSubgroupBallot | kFeatureSubgroupShuffle |
+                                         kFeatureSubgroupVote);
         return {};
     }
     if (key == "staging") {

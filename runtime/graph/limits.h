@@ -22,12 +22,13 @@ struct MatrixShape {
 struct DeviceLimits {
     DeviceType type = DeviceType::cpu;
     uint32_t subgroup_size = 8;
-    uint32_t needs_supported = 0; // KernelNeeds
+    uint32_t features = 0; // KernelFeatures
     MatrixShape matrix;
     uint32_t max_shared_bytes = 16384;
     uint32_t max_group_threads = 128;
     uint32_t max_groups = 65535; // per dimension
-    uint32_t compute_units = 128; // that run workgroups side by side (multiprocessors); about, where a driver says nothing
+    uint32_t compute_units =
+        128; // that run workgroups side by side (multiprocessors); about, where a driver says nothing
     uint64_t max_storage_range = 128ull << 20;
     uint64_t max_texel_elements = 65536;
     uint64_t max_allocation = 1ull << 30;

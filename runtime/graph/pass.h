@@ -90,10 +90,10 @@ struct DispatchOptions {
     // must know which rows it has
     std::vector<BandedBinding> banded = {};
     // the constant with which a producer of binding X can do this dispatch's work in its epilogue ("kGelu")
-    std::string_view absorbed_as = {};
-    bool keeps_x = false;       // absorbed: the producer goes on writing X, others may read it (statistics of X)
-    double flops = 0;           // counted
-    double most_operations = 0; // about, at most: where the data says how many
+    std::string_view epilogue = {};
+    bool keeps_x = false; // absorbed: the producer goes on writing X, others may read it (statistics of X)
+    double flops = 0;     // counted
+    double max_flops = 0; // about, at most: where the data says how many
     // ways to do it, of which the first is taken; where there are more, runs on a device find the fastest
     std::vector<Alternative> alternatives = {};
 };
@@ -121,8 +121,8 @@ struct Pass {
     // what follows is the plan's
     std::vector<PassBinding> bindings;
     uint32_t group_count[3] = {1, 1, 1};
-    std::vector<uint32_t> absorbed; // ids of the constants of fused epilogues, and the bindings they took
-    std::vector<size_t> slots;
+    std::vector<uint32_t> epilogues; // ids of the constants of fused epilogues, and the bindings they took
+    std::vector<size_t> epilogue_bindings;
     uint32_t level = 0;       // passes of one level run without a barrier between them
     uint32_t alternative = 0; // the one that is taken
 

@@ -97,7 +97,7 @@ Pass band_of(const Pass& whole, uint32_t first, uint32_t count, uint32_t total, 
         pass.set_push(shader_interface::kFirstRow, first);
     pass.grid.x = pass.grid.unit == Grid::Unit::tiles ? count : uint32_t(uint64_t(whole.grid.x) * count / total);
     pass.options.flops = whole.options.flops * count / total;
-    pass.options.most_operations = whole.options.most_operations * count / total;
+    pass.options.max_flops = whole.options.max_flops * count / total;
     return pass;
 }
 

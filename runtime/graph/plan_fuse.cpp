@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// stage 2: a dispatch that says `absorbed_as = kName` moves into the epilogue of the pass that makes its input X, when
+// stage 2: a dispatch that says `epilogue = kName` moves into the epilogue of the pass that makes its input X, when
 // that kernel declares the constant kName. Bindings and push members move by name, so no op is known here. One that
 // keeps X only adds an output (statistics of X).
 #include "runtime/graph/plan.h"
@@ -135,20 +135,20 @@ Status move_push(const Pass& from, Pass& to)
 }
 
 // where the producer binds what the consumer's binding b does; X aside, which is no more
-std::optional<size_t> slot_of(const Pass& consumer, size_t b, const Pass& producer)
+std::optional<size_t> producer_binding(const Pass& consumer, size_t b, const Pass& producer)
 {
     return producer.variant->binding(consumer.variant->bindings[b].name);
 }
 
 // does the producer bind all that the consumer does, and no other epilogue of it the same?
-bool has_slots(const Pass& consumer, const Pass& producer)
+bool has_epilogue_bindings(const Pass& consumer, const Pass& producer)
 {
     for (size_t b = 0; b < consumer.tensors.size(); ++b) {
         if (is_input(consumer, b))
             continue;
-        const std::optional<size_t> slot = slot_of(consumer, b, producer);
-        if (!slot || (consumer.variant->bindings[b].name != shader_interface::kOutput &&
-                      std::ranges::count(producer.slots, *slot)))
+        const std::optional<size_t> binding = producer_binding(consumer, b, producer);
+        if (!binding || (consumer.variant->bindings[b].name != shader_interface::kOutput &&
+                         std::ranges::count(producer.epilogue_bindings, *binding)))
             return false;
     }
     return true;
@@ -158,16 +158,17 @@ bool has_slots(const Pass& consumer, const Pass& producer)
 Pass* find_producer(Plan& plan, size_t consumer)
 {
     const Pass& c = plan.passes[consumer];
-    if (c.options.absorbed_as.empty() || !input_of(c))
+    if (c.options.epilogue.empty() || !input_of(c))
         return nullptr;
     Pass* producer = c.options.keeps_x ? last_writer(plan, consumer) : sole_producer(plan, consumer);
     if (!producer)
         return nullptr;
-    const ConstantInfo* absorbing = producer->variant->constant(c.options.absorbed_as);
+    const ConstantInfo* absorbing = producer->variant->constant(c.options.epilogue);
     const std::optional<size_t> y = producer->variant->binding(shader_interface::kOutput);
-    const bool takes = absorbing && y && same(producer->tensors[*y], *input_of(c)) && has_slots(c, *producer) &&
+    const bool takes = absorbing && y && same(producer->tensors[*y], *input_of(c)) &&
+                       has_epilogue_bindings(c, *producer) &&
                        // the shader applies its epilogues in the order of their ids
-                       (producer->absorbed.empty() || producer->absorbed.back() < absorbing->id) &&
+                       (producer->epilogues.empty() || producer->epilogues.back() < absorbing->id) &&
                        can_move_up(plan, producer, consumer) && !overwrites_input(plan, *producer, c);
     return takes ? producer : nullptr;
 }
@@ -177,12 +178,12 @@ Status absorb(const Pass& c, Pass& producer)
     for (size_t b = 0; b < c.tensors.size(); ++b) {
         if (is_input(c, b))
             continue;
-        const size_t slot = *slot_of(c, b, producer);
-        producer.tensors[slot] = c.tensors[b];
-        producer.slots.push_back(slot);
+        const size_t binding = *producer_binding(c, b, producer);
+        producer.tensors[binding] = c.tensors[b];
+        producer.epilogue_bindings.push_back(binding);
     }
-    producer.absorbed.push_back(producer.variant->constant(c.options.absorbed_as)->id);
-    producer.set_constant(c.options.absorbed_as, 1);
+    producer.epilogues.push_back(producer.variant->constant(c.options.epilogue)->id);
+    producer.set_constant(c.options.epilogue, 1);
     if (!producer.options.banded.empty()) // else its rows cannot be cut, and neither can these
         for (const BandedBinding& band : c.options.banded)
             if (band.name != shader_interface::kInput && band.name != shader_interface::kOutput)

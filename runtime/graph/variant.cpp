@@ -16,14 +16,14 @@ bool runs_on(const KernelVariant& v, const DeviceLimits& limits, std::span<const
     const auto buffers = std::ranges::count(v.bindings, BindingKind::storage, &BindingInfo::kind);
     const uint32_t group_threads = v.local_size[0] * v.local_size[1] * v.local_size[2];
     return shared_bytes(v, constants) <= limits.max_shared_bytes && group_threads <= limits.max_group_threads &&
-           (v.needs & ~limits.needs_supported) == 0 && v.push_bytes <= limits.max_push_bytes &&
+           (v.features & ~limits.features) == 0 && v.push_bytes <= limits.max_push_bytes &&
            uint64_t(buffers) <= limits.max_storage_buffers;
 }
 
 // those for cooperative matrices are passed over for their types, as there are others; others say what they do not take
 bool suits(const Kernel& kernel, const KernelVariant& v, std::span<const Tensor> tensors)
 {
-    if (!(v.needs & kNeedsCooperativeMatrix))
+    if (!(v.features & kFeatureCooperativeMatrix))
         return true;
     for (size_t b = 0; b < std::min(tensors.size(), v.bindings.size()); ++b)
         if (tensors[b].valid() && !takes(kernel, v, b, tensors[b].dtype))
@@ -73,7 +73,7 @@ const KernelVariant* choose_variant(const Kernel& kernel, const DeviceLimits& li
 {
     const KernelVariant* best = nullptr;
     for (const KernelVariant& v : kernel.variants)
-        if (!(v.needs & excluded) && runs_on(v, limits, constants) && suits(kernel, v, tensors) &&
+        if (!(v.features & excluded) && runs_on(v, limits, constants) && suits(kernel, v, tensors) &&
             (!best || preference(v.name, limits) < preference(best->name, limits)))
             best = &v;
     return best;

@@ -8,10 +8,10 @@
 void STORE_STAGE()
 {
     [[unroll]] for (uint i = 0; i < kLoadsX; ++i)
-        if (kTileM * kStep / 8 % kThreads == 0 || load_row(i) < kTileM)
+        if (kTileM * kTileK / 8 % kThreads == 0 || load_row(i) < kTileM)
             STAGE_X[(load_row(i) * kPitch + load_k()) / 8] = next_x[i];
     [[unroll]] for (uint i = 0; i < kLoadsW; ++i)
-        if (kTileN * kStep / 8 % kThreads == 0 || load_row(i) < kTileN)
+        if (kTileN * kTileK / 8 % kThreads == 0 || load_row(i) < kTileN)
             STAGE_W[(load_row(i) * kPitch + load_k()) / 8] = next_w[i];
 }
 
@@ -27,9 +27,9 @@ void MULTIPLY_STAGE()
     if (kAhead) {
         MatrixX a[2 * kMatsDown];
         MatrixW b[2 * kMatsAcross];
-        [[unroll]] for (uint k = 0; k < kStep + kMatK; k += kMatK) {
+        [[unroll]] for (uint k = 0; k < kTileK + kMatK; k += kMatK) {
             const uint next = k / kMatK % 2;
-            if (k < kStep) {
+            if (k < kTileK) {
                 [[unroll]] for (uint i = 0; i < kMatsDown; ++i)
                     LOAD_X(a[next * kMatsDown + i], i, k);
                 [[unroll]] for (uint j = 0; j < kMatsAcross; ++j)
@@ -42,7 +42,7 @@ void MULTIPLY_STAGE()
         }
         return;
     }
-    [[unroll]] for (uint k = 0; k < kStep; k += kMatK) {
+    [[unroll]] for (uint k = 0; k < kTileK; k += kMatK) {
         MatrixX a[kMatsDown];
         [[unroll]] for (uint i = 0; i < kMatsDown; ++i)
             LOAD_X(a[i], i, k);

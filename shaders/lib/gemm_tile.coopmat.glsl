@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // kTileM x kTileN outputs of a workgroup as cooperative matrices, fp16 factors and fp32 sums. Its subgroups, kDown of them
-// one below the other, own a part each. kStep columns of K at a time are in shared memory, in one stage or in two; the next
+// one below the other, own a part each. kTileK columns of K at a time are in shared memory, in one stage or in two; the next
 // ones are loaded into registers behind the arithmetic. kernels/network/matmul_tiles sets all of these; all give the same
 // bits, as K is summed in one order. Includers say load_next(): next_x and next_w of the next step, false if there is none.
 #include "lib/cooperative_matrix.glsl"
 
-layout(constant_id = 34) const uint kStep = 32; // a multiple of 16 and of kMatK
+layout(constant_id = 34) const uint kTileK = 32; // a multiple of 16 and of kMatK
 layout(constant_id = 35) const uint kSubgroups = 4;
 layout(constant_id = 37) const uint kDown = 2;
 layout(constant_id = 38) const uint kStages = 1;          // 2: one barrier a step in place of two
@@ -15,11 +15,11 @@ layout(constant_id = 39) const bool kAhead = false;       // factors are loaded 
 layout(constant_id = 40) const bool kWholeSteps = false;  // no step goes beyond what there is of K
 layout(constant_id = 41) const uint kStrip = 16;          // columns that a subgroup finishes at once
 layout(constant_id = 42) const uint kRowsOfTiles = 1;     // that workgroups go through together; 1: columns of tiles
-const uint kPitch = kStep + 8; // fp16 of a row: 16 bytes more, so that rows begin in different banks
+const uint kPitch = kTileK + 8; // fp16 of a row: 16 bytes more, so that rows begin in different banks
 const uint kPartM = kTileM / kDown, kPartN = kTileN / (kSubgroups / kDown);
 const uint kMatsDown = kPartM / kMatM, kMatsAcross = kPartN / kMatN;
-const uint kLoadsX = (kTileM * kStep / 8 + kThreads - 1) / kThreads;
-const uint kLoadsW = (kTileN * kStep / 8 + kThreads - 1) / kThreads;
+const uint kLoadsX = (kTileM * kTileK / 8 + kThreads - 1) / kThreads;
+const uint kLoadsW = (kTileN * kTileK / 8 + kThreads - 1) / kThreads;
 const uint kSlab = 16, kSlabPitch = kStrip / 4 + 1; // rows that a subgroup finishes at once, and vec4 of a row
 
 // [row][k] and [col][k], eight fp16 each; the first is each subgroup's slab of sums when all is multiplied
@@ -35,8 +35,8 @@ MatrixY sums[kMatsDown * kMatsAcross];
 uvec4 next_x[kLoadsX], next_w[kLoadsW]; // of the next step: eight columns of a row each
 
 // which row of the tile, and which columns of the step, load i of this thread brings
-uint load_row(uint i) { return (i * kThreads + gl_LocalInvocationID.x) / (kStep / 8); }
-uint load_k() { return gl_LocalInvocationID.x % (kStep / 8) * 8; } // kThreads is a multiple of kStep / 8
+uint load_row(uint i) { return (i * kThreads + gl_LocalInvocationID.x) / (kTileK / 8); }
+uint load_k() { return gl_LocalInvocationID.x % (kTileK / 8) * 8; } // kThreads is a multiple of kTileK / 8
 
 void clear_tile()
 {

@@ -4,14 +4,14 @@
 // kTileM x kTileM outputs of a workgroup of 64 threads: 64 x 64, or 32 x 32 where a large GPU would have fewer workgroups
 // than units. The planner chooses (kTileM and kTileN alike); both give the same bits, as K is summed in one order. 16
 // columns of K at a time in shared memory.
-const uint kStep = 16;               // columns of K in shared memory
+const uint kTileK = 16;               // columns of K in shared memory
 const uint kPitch = 68;              // floats of a row of 64; keeps vec4 alignment, spreads transposing stores over banks
 const uint kOwn = kTileM / 8;        // rows and columns that a thread sums: 8 x 8 or 4 x 4
 const uint kAcross = kTileM / 8;     // threads side by side when sums are stored, eight columns each
 const uint kRows = kTileM * kTileM / 512; // rows that a thread stores: 8 or 2
-const uint kBring = kStep * kTileM / 256;          // fours of columns that a thread brings: 4 or 2
-const uint kTileX = 0, kTileW = kStep * kPitch;
-shared float tile[2 * kStep * kPitch]; // [k][row] of x, [k][col] of w
+const uint kBring = kTileK * kTileM / 256;          // fours of columns that a thread brings: 4 or 2
+const uint kTileX = 0, kTileW = kTileK * kPitch;
+shared float tile[2 * kTileK * kPitch]; // [k][row] of x, [k][col] of w
 
 // kOwn rows from kOwn (thread / 8) on. While sums are made, four columns from 4 (thread % 8) on and in the larger tile
 // four 32 further: so eight threads read 32 floats next to each other, one from each of 32 banks. store_tile() first
@@ -45,7 +45,7 @@ void stage(vec4 a[4], vec4 b[4])
 void multiply()
 {
     const uint tm = kTileX + thread_row(), tn = kTileW + thread_quad();
-    [[unroll]] for (uint s = 0; s < kStep; ++s) {
+    [[unroll]] for (uint s = 0; s < kTileK; ++s) {
         float u[8], v[8];
         [[unroll]] for (uint i = 0; i < kOwn; ++i) {
             u[i] = tile[s * kPitch + tm + i];

@@ -2,7 +2,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // y[n] = epilogue(sum over taps and channels of w[n, tap, c] x[pixel at tap, c]) of fp16 factors, for GPUs with matrix
-// units: an implicit GEMM with the tiles of gemm.coopmat.comp, kStep channels of a tap at a time.
+// units: an implicit GEMM with the tiles of gemm.coopmat.comp, kTileK channels of a tap at a time.
 // tools/dev/spirv compiles it.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
@@ -43,9 +43,9 @@ uint aimed_tap = ~0u, aimed_input = 0; // that x_at are of
 uint x_at[kLoadsX], w_at[kLoadsW];     // texels of these rows: x from its columns on
 uint inside_image;                     // bit i: load i of x reads a pixel, else zeros
 
-const uint kRun = 128; // channels, or the last ones of an input: slices of K are cut there, whatever kStep is
+const uint kRun = 128; // channels, or the last ones of an input: slices of K are cut there, whatever kTileK is
 
-uint second_begins() { return (p.x_cols + kStep - 1) / kStep * kStep; }
+uint second_begins() { return (p.x_cols + kTileK - 1) / kTileK * kTileK; }
 
 Cursor start_of(uint slice)
 {
@@ -58,7 +58,7 @@ bool before(Cursor a, Cursor b) { return a.tap < b.tap || (a.tap == b.tap && a.c
 
 void advance()
 {
-    cursor.channel += kStep;
+    cursor.channel += kTileK;
     if (cursor.channel >= (kTwoInputs ? second_begins() + p.x2_cols : p.x_cols)) {
         cursor.channel = 0;
         ++cursor.tap;

@@ -36,8 +36,8 @@ struct Cursor {
 
 void advance(inout Cursor c)
 {
-    c.channel += kStep;
-    const uint first = (p.x_cols + kStep - 1) / kStep * kStep; // the second input starts a step of its own
+    c.channel += kTileK;
+    const uint first = (p.x_cols + kTileK - 1) / kTileK * kTileK; // the second input starts a step of its own
     const uint end = kTwoInputs ? first + p.x2_cols : p.x_cols;
     if (c.channel >= end) {
         c.channel = 0;
@@ -54,7 +54,7 @@ void load(ConvPixel pixel, uint w_row, Cursor c, out vec4 a[4], out vec4 b[4])
         return;
     uint row;
     const bool inside = conv_tap(pixel, c.tap / kKernelWidth, c.tap % kKernelWidth, row);
-    const uint first = (p.x_cols + kStep - 1) / kStep * kStep;
+    const uint first = (p.x_cols + kTileK - 1) / kTileK * kTileK;
     const bool second = kTwoInputs && c.channel >= first;
     const uint channel = second ? c.channel - first : c.channel, cols = second ? p.x2_cols : p.x_cols;
     const uint x_at = second ? (row - p.x2_first) * p.x2_ld : (row - p.x_first) * p.x_ld;

@@ -45,7 +45,7 @@ bool load_next()
         next_x[i] = inside ? x[x_at[i] + k / 8] : uvec4(0);
     [[unroll]] for (uint i = 0; i < kLoadsW; ++i)
         next_w[i] = inside ? load_weight_halves(w_at[i], k + load_k()) : uvec4(0);
-    k += kStep;
+    k += kTileK;
     return true;
 }
 

@@ -46,11 +46,11 @@ void main()
     clear_tile();
     vec4 a[4], b[4];
     load(x_row, w_row, 0, a, b);
-    for (uint k = 0; k < p.depth; k += kStep) {
+    for (uint k = 0; k < p.depth; k += kTileK) {
         barrier();
         stage(a, b);
         barrier();
-        load(x_row, w_row, k + kStep, a, b);
+        load(x_row, w_row, k + kTileK, a, b);
         multiply();
     }
     store_tile(row, col);

@@ -59,7 +59,7 @@ inline std::string op_name(const Pass& pass)
 {
     if (pass.kernel->name != "activation")
         return std::string(pass.kernel->name);
-    std::string function(pass.options.absorbed_as.substr(1)); // "kGelu"
+    std::string function(pass.options.epilogue.substr(1)); // "kGelu"
     function[0] = char(std::tolower(function[0]));
     return function;
 }

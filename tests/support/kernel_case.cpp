@@ -106,8 +106,8 @@ Tensor KernelCase::output(uint32_t rows, uint32_t cols, DType dtype, uint32_t ld
 
 Status KernelCase::compile_and_run()
 {
-    SR_TRY(program_, Program::create(device_, graph));
-    return program_->run();
+    SR_TRY(executable_, Executable::create(device_, graph));
+    return executable_->run();
 }
 
 HostMatrix KernelCase::run(Tensor y)

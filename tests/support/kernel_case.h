@@ -3,7 +3,7 @@
 #pragma once
 
 #include "kernels/network.h"
-#include "runtime/device/program.h"
+#include "runtime/device/executable.h"
 
 #include <cstring>
 #include <gtest/gtest.h>
@@ -57,9 +57,9 @@ class KernelCase {
     Tensor output(uint32_t rows, uint32_t cols, DType dtype, uint32_t ld = 0);
 
     Status compile_and_run();
-    const Plan& plan() const { return program_->plan(); }
+    const Plan& plan() const { return executable_->plan(); }
 
-    // runs the graph and reads y, which is copied out of the arena through a program that ends in memory of ours
+    // runs the graph and reads y, which is copied out of the arena through an executable that ends in memory of ours
     HostMatrix run(Tensor y);
     HostMatrix read(const Tensor& t);
     template <typename T>
@@ -81,7 +81,7 @@ class KernelCase {
     Device& device_;
     std::mt19937 random_;
     std::vector<std::unique_ptr<Buffer>> buffers_;
-    std::unique_ptr<Program> program_;
+    std::unique_ptr<Executable> executable_;
 };
 
 } // namespace semrover

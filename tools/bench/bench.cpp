@@ -49,13 +49,13 @@ Json bench_report(const char* kind, const Device& device, DType precision, const
             {"peak_bytes", device.peak_bytes()}};
 }
 
-void add_program(Json& report, const Program& program)
+void add_executable(Json& report, const Executable& executable)
 {
-    const Plan& plan = program.plan();
+    const Plan& plan = executable.plan();
     report["dispatches"] = plan.dispatches.size();
     report["barriers"] = plan.barriers();
     report["submits"] = plan.submits;
-    report["host_us_per_step"] = program.host_us();
+    report["host_us_per_step"] = executable.host_us();
 }
 
 void add_rate(Json& report, double flops, const Timing& timing)
@@ -65,28 +65,30 @@ void add_rate(Json& report, double flops, const Timing& timing)
     report["gflops_best"] = flops / timing.ms_min / 1e6;
 }
 
-double flops_of(const Program& program)
+double flops_of(const Executable& executable)
 {
     double flops = 0;
-    for (const Pass& pass : program.plan().passes)
+    for (const Pass& pass : executable.plan().passes)
         flops += pass.options.flops;
     return flops;
 }
 
-void add_network(Json& report, const Program& program, const Timing& timing, uint64_t parameters, uint64_t weight_bytes)
+void add_network(Json& report, const Executable& executable, const Timing& timing, uint64_t parameters,
+                 uint64_t weight_bytes)
 {
     report["parameters"] = parameters;
     report["weight_bytes"] = weight_bytes;
-    report["arena_bytes"] = program.plan().arena_bytes();
-    add_rate(report, flops_of(program), timing);
-    add_program(report, program);
+    report["arena_bytes"] = executable.plan().arena_bytes();
+    add_rate(report, flops_of(executable), timing);
+    add_executable(report, executable);
 }
 
 void add_profile(CLI::App& command, std::string& path)
 {
-    command.add_option("--profile", path,
-                       "write device times as a Chrome trace; their sums, and what the driver says of each kernel's code, "
-                       "to stderr");
+    command.add_option(
+        "--profile", path,
+        "write device times as a Chrome trace; their sums, and what the driver says of each kernel's code, "
+        "to stderr");
 }
 
 void add_weights(CLI::App& command, std::string& weights)
@@ -134,9 +136,9 @@ void print_report(const Json& report, const Globals& globals)
         fmt::print("{:18} {}\n", name, value.is_string() ? value.get<std::string>() : value.dump());
 }
 
-Slot BenchInputs::add(uint32_t rows, uint32_t cols, DType dtype)
+DeviceTensor BenchInputs::add(uint32_t rows, uint32_t cols, DType dtype)
 {
-    return slots_.emplace_back(state_.slot(rows, cols, dtype, "input", dtype == DType::u32 ? cols : 0));
+    return slots_.emplace_back(state_.tensor(rows, cols, dtype, "input", dtype == DType::u32 ? cols : 0));
 }
 
 Status BenchInputs::allocate()
@@ -144,7 +146,7 @@ Status BenchInputs::allocate()
     SR_CHECK(state_.allocate(device_, "benchmark inputs"));
     uint32_t state = 12345;
     const auto random = [&] { return state = state * 1664525u + 1013904223u; };
-    for (const Slot& slot : slots_) {
+    for (const DeviceTensor& slot : slots_) {
         std::vector<uint32_t> words(slot.bytes() / 4);
         for (uint32_t& w : words) {
             const float v = float(random() >> 8) / 8388608.f - 1;

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "runtime/base/json.h"
-#include "runtime/device/program.h"
-#include "runtime/device/state.h"
+#include "runtime/device/executable.h"
+#include "runtime/device/tensor_pool.h"
 #include "tools/cli/commands.h"
 
 #include <functional>
@@ -30,14 +30,15 @@ Result<Timing> measure(const std::function<Status()>& work);
 // the fields that every benchmark's JSON has
 Json bench_report(const char* kind, const Device& device, DType precision, const Timing& timing,
                   uint64_t predicted_bytes);
-void add_program(Json& report, const Program& program);          // dispatches, barriers, submits of a run; host_us_per_step
+void add_executable(Json& report,
+                    const Executable& executable); // dispatches, barriers, submits of a run; host_us_per_step
 void add_rate(Json& report, double flops, const Timing& timing); // gflop, gflops, gflops_best
 // the same of a network's evaluation, and gflop (what is computed: Winograd's algorithm counts as little as it does),
 // gflops, weight_bytes
-void add_network(Json& report, const Program& program, const Timing& timing, uint64_t parameters,
+void add_network(Json& report, const Executable& executable, const Timing& timing, uint64_t parameters,
                  uint64_t weight_bytes);
-// multiplications and additions of a program, as its plan counts them
-double flops_of(const Program& program);
+// multiplications and additions of an executable, as its plan counts them
+double flops_of(const Executable& executable);
 // a network's config.json; `config` as it is where there is no path
 template <typename Config, typename Parse>
 Status read_config(const std::string& path, Parse parse, Config& config)
@@ -66,14 +67,14 @@ class BenchInputs {
   public:
     explicit BenchInputs(Device& device) : device_(device) {}
     // normal-ish values as fp32 or fp16 matrices, small ones as q8_0, or uniform words for u32
-    Slot add(uint32_t rows, uint32_t cols, DType dtype);
+    DeviceTensor add(uint32_t rows, uint32_t cols, DType dtype);
     Status allocate();
     uint64_t bytes() const { return state_.planned_bytes(device_.limits()); }
 
   private:
     Device& device_;
-    State state_;
-    std::vector<Slot> slots_;
+    TensorPool state_;
+    std::vector<DeviceTensor> slots_;
 };
 
 // y [m, n] = x [m, k] w [n, k]^T
@@ -81,8 +82,8 @@ struct GemmShape {
     uint32_t m = 384, n = 4096, k = 1024;
 };
 // w of another type: whole blocks of K
-Result<std::unique_ptr<Program>> gemm_program(Device& device, BenchInputs& inputs, const GemmShape& shape, DType dtype,
-                                              std::optional<DType> w_dtype = {});
+Result<std::unique_ptr<Executable>> gemm_executable(Device& device, BenchInputs& inputs, const GemmShape& shape,
+                                                    DType dtype, std::optional<DType> w_dtype = {});
 
 // a street: ground, two facades and blobs between them, in front of a camera at the origin that looks along x
 Splats street_splats(uint32_t count, float sigma);

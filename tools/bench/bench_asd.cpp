@@ -71,8 +71,8 @@ Status bench_asd(const BenchAsdArguments& o, const Globals& globals)
     report["guidance_scale"] = o.cfg_scale;
     report["encode_ms"] = encode.ms_median;
     report["decode_ms"] = decode.ms_median;
-    add_rate(report, flops_of(asd->step_program()), step);
-    add_program(report, asd->step_program());
+    add_rate(report, flops_of(asd->step_executable()), step);
+    add_executable(report, asd->step_executable());
     print_report(report, globals);
     return {};
 }

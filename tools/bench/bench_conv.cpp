@@ -27,8 +27,8 @@ Status bench_conv(const BenchConvArguments& o, const Globals& globals)
     const DType dtype = o.precision == "fp32" ? DType::f32 : DType::f16;
     BenchInputs inputs(*device);
     FeatureMap map{{}, 1, o.height, o.width};
-    const Slot x = inputs.add(map.image_rows(), o.channels, dtype);
-    const Slot w = inputs.add(o.outputs, 9 * round_up(o.channels, kRowPadding), dtype);
+    const DeviceTensor x = inputs.add(map.image_rows(), o.channels, dtype);
+    const DeviceTensor w = inputs.add(o.outputs, 9 * round_up(o.channels, kRowPadding), dtype);
     SR_CHECK(inputs.allocate());
     Graph g(device->limits());
     map.data = x.in(g);
@@ -37,19 +37,19 @@ Status bench_conv(const BenchConvArguments& o, const Globals& globals)
     const Tensor weight = w.in(g);
     (void)(o.winograd ? winograd_conv2d(g, map, winograd_weight(g, weight), {}, options)
                       : conv2d(g, map, {}, weight, {}, options));
-    SR_TRY(const auto program, Program::create(*device, g));
-    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
+    SR_TRY(const auto executable, Executable::create(*device, g));
+    SR_TRY(const Timing timing, measure([&] { return executable->run(); }));
     if (o.plan)
-        print_stderr("{}", plan_text(program->plan()));
-    Json report = bench_report("conv", *device, dtype, timing, inputs.bytes() + program->plan().arena_bytes());
+        print_stderr("{}", plan_text(executable->plan()));
+    Json report = bench_report("conv", *device, dtype, timing, inputs.bytes() + executable->plan().arena_bytes());
     report["width"] = o.width;
     report["height"] = o.height;
     report["channels"] = o.channels;
     report["outputs"] = o.outputs;
     report["algorithm"] = o.winograd ? "winograd" : "direct";
-    report["variant"] = program->plan().passes[0].variant->name;
+    report["variant"] = executable->plan().passes[0].variant->name;
     add_rate(report, 2.0 * 9 * o.channels * o.outputs * o.width * o.height, timing); // as a direct convolution
-    add_program(report, *program);
+    add_executable(report, *executable);
     print_report(report, globals);
     return write_profile(*device, o.profile);
 }

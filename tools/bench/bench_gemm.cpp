@@ -29,32 +29,32 @@ Status bench_gemm(const BenchGemmArguments& o, const Globals& globals)
         return fail(ErrorCode::usage, "--weights q8_0: --k is {}, no multiple of {}", o.shape.k,
                     block_of(w_dtype).elements);
     BenchInputs inputs(*device);
-    SR_TRY(const auto program, gemm_program(*device, inputs, o.shape, dtype, w_dtype));
-    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
+    SR_TRY(const auto executable, gemm_executable(*device, inputs, o.shape, dtype, w_dtype));
+    SR_TRY(const Timing timing, measure([&] { return executable->run(); }));
     if (o.plan)
-        print_stderr("{}", plan_text(program->plan()));
-    Json report = bench_report("gemm", *device, dtype, timing, inputs.bytes() + program->plan().arena_bytes());
+        print_stderr("{}", plan_text(executable->plan()));
+    Json report = bench_report("gemm", *device, dtype, timing, inputs.bytes() + executable->plan().arena_bytes());
     report["m"] = o.shape.m;
     report["n"] = o.shape.n;
     report["k"] = o.shape.k;
-    report["variant"] = program->plan().passes[0].variant->name;
-    add_rate(report, flops_of(*program), timing);
-    add_program(report, *program);
+    report["variant"] = executable->plan().passes[0].variant->name;
+    add_rate(report, flops_of(*executable), timing);
+    add_executable(report, *executable);
     print_report(report, globals);
     return write_profile(*device, o.profile);
 }
 
 } // namespace
 
-Result<std::unique_ptr<Program>> gemm_program(Device& device, BenchInputs& inputs, const GemmShape& s, DType dtype,
-                                              std::optional<DType> w_dtype)
+Result<std::unique_ptr<Executable>> gemm_executable(Device& device, BenchInputs& inputs, const GemmShape& s,
+                                                    DType dtype, std::optional<DType> w_dtype)
 {
-    const Slot x = inputs.add(s.m, s.k, dtype), w = inputs.add(s.n, s.k, w_dtype.value_or(dtype));
-    const Slot y = inputs.add(s.m, s.n, dtype);
+    const DeviceTensor x = inputs.add(s.m, s.k, dtype), w = inputs.add(s.n, s.k, w_dtype.value_or(dtype));
+    const DeviceTensor y = inputs.add(s.m, s.n, dtype);
     SR_CHECK(inputs.allocate());
     Graph g(device.limits());
     g.keep(gemm(g, x.in(g), w.in(g), {}, {.dtype = dtype}), y.in(g));
-    return Program::create(device, g);
+    return Executable::create(device, g);
 }
 
 void add_bench_gemm(CLI::App& bench, const Globals& globals, Run& run)

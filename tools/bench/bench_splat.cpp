@@ -28,20 +28,20 @@ Status bench_sort(const SortOptions& o, const Globals& globals)
 {
     SR_TRY(const auto device, open_device(globals, o.profile));
     BenchInputs inputs(*device);
-    const Slot keys = inputs.add(o.pairs, 1, DType::u32), values = inputs.add(o.pairs, 1, DType::u32);
+    const DeviceTensor keys = inputs.add(o.pairs, 1, DType::u32), values = inputs.add(o.pairs, 1, DType::u32);
     const uint64_t predicted = inputs.bytes();
     SR_CHECK(inputs.allocate());
     Graph g(device->limits());
     (void)radix_sort(g, keys.in(g), values.in(g));
-    SR_TRY(const auto program, Program::create(*device, g));
-    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
-    Json report = bench_report("sort", *device, DType::f32, timing, predicted + program->plan().arena_bytes());
+    SR_TRY(const auto executable, Executable::create(*device, g));
+    SR_TRY(const Timing timing, measure([&] { return executable->run(); }));
+    Json report = bench_report("sort", *device, DType::f32, timing, predicted + executable->plan().arena_bytes());
     report["precision"] = "u32";
     report["pairs"] = o.pairs;
     report["mpairs_per_second"] = o.pairs / timing.ms_median / 1e3;
     // four passes over 8-bit digits read keys twice and values once and write both
     report["gbps"] = 80.0 * o.pairs / timing.ms_median / 1e6;
-    add_program(report, *program);
+    add_executable(report, *executable);
     print_report(report, globals);
     return write_profile(*device, o.profile);
 }
@@ -99,7 +99,7 @@ Status bench_splat(const SplatBenchOptions& o, const Globals& globals)
     report["msplats_per_second"] = o.splats / timing.ms_median / 1e3;
     // a record of 64 bytes a splat and 48 bytes of outputs a pixel, once
     report["gbps"] = (64.0 * o.splats + 48.0 * o.width * o.height) / timing.ms_median / 1e6;
-    add_program(report, rasterizer->program());
+    add_executable(report, rasterizer->executable());
     print_report(report, globals);
     return write_profile(*device, o.profile);
 }

@@ -83,18 +83,18 @@ Json json_of(const MatmulTile& t)
 
 // a product or convolution that is made several times, one after the other; the last one's output is y
 struct TileProgram {
-    Slot y;
-    std::unique_ptr<Program> program;
+    DeviceTensor y;
+    std::unique_ptr<Executable> executable;
     double flops = 0; // of all
 };
 
-Result<TileProgram> tile_program(Device& device, BenchInputs& inputs, const TileShape& s, const MatmulTile& tile,
-                                 uint32_t repeats)
+Result<TileProgram> tile_executable(Device& device, BenchInputs& inputs, const TileShape& s, const MatmulTile& tile,
+                                    uint32_t repeats)
 {
     const DType half = DType::f16;
     FeatureMap map{{}, 2, s.side, s.side};
     const uint32_t rows = s.side ? 2 * map.image_rows() : s.rows, channels = s.side ? s.depth / 9 : s.depth;
-    const Slot x = inputs.add(rows, channels, half), w = inputs.add(s.cols, s.depth, half);
+    const DeviceTensor x = inputs.add(rows, channels, half), w = inputs.add(s.cols, s.depth, half);
     TileProgram made{inputs.add(rows, s.cols, half), nullptr};
     SR_CHECK(inputs.allocate());
     Graph g(device.limits());
@@ -106,8 +106,8 @@ Result<TileProgram> tile_program(Device& device, BenchInputs& inputs, const Tile
         y = s.side ? conv2d(g, map, {}, weight, {}, {.dtype = half, .tile = &tile}).data
                    : gemm(g, map.data, weight, {}, {.dtype = half, .tile = &tile});
     g.keep(y, made.y.in(g));
-    SR_TRY(made.program, Program::create(device, g));
-    made.flops = flops_of(*made.program);
+    SR_TRY(made.executable, Executable::create(device, g));
+    made.flops = flops_of(*made.executable);
     return made;
 }
 
@@ -115,8 +115,8 @@ Result<TileProgram> tile_program(Device& device, BenchInputs& inputs, const Tile
 Result<std::vector<uint32_t>> output_of(Device& device, const TileShape& shape, const MatmulTile& tile)
 {
     BenchInputs inputs(device);
-    SR_TRY(const TileProgram made, tile_program(device, inputs, shape, tile, 1));
-    SR_CHECK(made.program->run());
+    SR_TRY(const TileProgram made, tile_executable(device, inputs, shape, tile, 1));
+    SR_CHECK(made.executable->run());
     return made.y.read<uint32_t>(device);
 }
 
@@ -149,7 +149,7 @@ class TileBench {
     Status check_all()
     {
         const KernelVariant& variant = Graph(device_.limits()).variant(kernel::gemm);
-        if (!(variant.needs & kNeedsCooperativeMatrix))
+        if (!(variant.features & kFeatureCooperativeMatrix))
             return fail(ErrorCode::no_device,
                         "{}: tiles are of matrix units (VK_KHR_cooperative_matrix), which it has not", device_.name());
         std::vector<uint32_t> wanted;
@@ -173,12 +173,12 @@ class TileBench {
     Status time(const TileShape& shape, const MatmulTile& tile)
     {
         BenchInputs inputs(device_);
-        SR_TRY(const TileProgram made, tile_program(device_, inputs, shape, tile, o_.repeats));
+        SR_TRY(const TileProgram made, tile_executable(device_, inputs, shape, tile, o_.repeats));
         std::vector<double> ms;
         const CallTimer all;
         while (ms.size() < 4 || (all.ms() < 60 && ms.size() < 20)) {
             const CallTimer one;
-            SR_CHECK(made.program->run());
+            SR_CHECK(made.executable->run());
             ms.push_back(one.ms());
         }
         ms.erase(ms.begin()); // warms up

@@ -55,7 +55,7 @@ Status bench_transformer(const BenchTransformerArguments& o, const Globals& glob
     const std::vector<RegionInput> regions = make_regions(o, config.num_classes);
     SR_TRY(Timing timing, measure([&] { return sampler->run(regions).map([](const auto&) {}); }));
     if (o.plan)
-        print_stderr("{}", plan_text(sampler->step_program().plan()));
+        print_stderr("{}", plan_text(sampler->step_executable().plan()));
     timing.ms_median /= o.steps;
     timing.ms_min /= o.steps;
     Json report = bench_report("transformer", *device, dtype, timing, predicted);
@@ -63,8 +63,8 @@ Status bench_transformer(const BenchTransformerArguments& o, const Globals& glob
     report["cells"] = o.cells;
     report["batch"] = o.batch;
     report["guided"] = !o.unguided;
-    add_rate(report, flops_of(sampler->step_program()), timing);
-    add_program(report, sampler->step_program());
+    add_rate(report, flops_of(sampler->step_executable()), timing);
+    add_executable(report, sampler->step_executable());
     print_report(report, globals);
     return write_profile(*device, o.profile);
 }

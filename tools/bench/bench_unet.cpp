@@ -32,9 +32,9 @@ Status bench_unet(const BenchUnetArguments& o, const Globals& globals)
     FeatureMap x{{}, o.batch, o.height, o.width};
     BenchInputs inputs(*device);
     const uint32_t rows = x.image_rows() * o.batch;
-    const Slot sample = inputs.add(rows, config.in_channels, dtype);
-    const Slot table = inputs.add(1, unet->time_width(), DType::f32), row = inputs.add(o.batch, 1, DType::u32);
-    const Slot text = inputs.add(o.tokens, std::max(unet->context_width(), 1u), dtype);
+    const DeviceTensor sample = inputs.add(rows, config.in_channels, dtype);
+    const DeviceTensor table = inputs.add(1, unet->time_width(), DType::f32), row = inputs.add(o.batch, 1, DType::u32);
+    const DeviceTensor text = inputs.add(o.tokens, std::max(unet->context_width(), 1u), dtype);
     SR_CHECK(inputs.allocate());
     Graph g(device->limits());
     x.data = sample.in(g);
@@ -42,16 +42,16 @@ Status bench_unet(const BenchUnetArguments& o, const Globals& globals)
     SR_CHECK(row.clear(*device));
     (void)unet->forward(g, x, table.in(g), table_row, {text.in(g), o.tokens, 0});
     restart_profile(*device, o.profile);
-    SR_TRY(const auto program, Program::create(*device, g));
-    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
+    SR_TRY(const auto executable, Executable::create(*device, g));
+    SR_TRY(const Timing timing, measure([&] { return executable->run(); }));
     if (o.plan)
-        print_stderr("{}", plan_text(program->plan()));
-    const uint64_t predicted = unet->device_bytes(device->limits()) + inputs.bytes() + program->plan().arena_bytes();
+        print_stderr("{}", plan_text(executable->plan()));
+    const uint64_t predicted = unet->device_bytes(device->limits()) + inputs.bytes() + executable->plan().arena_bytes();
     Json report = bench_report("unet", *device, dtype, timing, predicted);
     report["width"] = o.width;
     report["height"] = o.height;
     report["batch"] = o.batch;
-    add_network(report, *program, timing, unet->parameters(), unet->device_bytes(device->limits()));
+    add_network(report, *executable, timing, unet->parameters(), unet->device_bytes(device->limits()));
     print_report(report, globals);
     return write_profile(*device, o.profile);
 }

@@ -31,23 +31,25 @@ Status bench_vae(const BenchVaeArguments& o, const Globals& globals)
     const uint32_t scale = o.encode ? 1 : config.downscale();
     FeatureMap x{{}, 1, divide_up(o.height, scale), divide_up(o.width, scale)};
     BenchInputs inputs(*device);
-    const Slot in = inputs.add(x.image_rows(), o.encode ? config.in_channels : config.latent_channels, DType::f32);
+    const DeviceTensor in =
+        inputs.add(x.image_rows(), o.encode ? config.in_channels : config.latent_channels, DType::f32);
     SR_CHECK(inputs.allocate());
     Graph g(device->limits());
     x.data = in.in(g);
     (void)(o.encode ? vae->encode(g, x) : vae->decode(g, x));
     restart_profile(*device, o.profile);
-    SR_TRY(const auto program, Program::create(*device, g));
-    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
+    SR_TRY(const auto executable, Executable::create(*device, g));
+    SR_TRY(const Timing timing, measure([&] { return executable->run(); }));
     if (o.plan)
-        print_stderr("{}", plan_text(program->plan()));
+        print_stderr("{}", plan_text(executable->plan()));
     const uint64_t weights = vae->device_bytes(device->limits());
-    Json report = bench_report("vae", *device, dtype, timing, weights + inputs.bytes() + program->plan().arena_bytes());
+    Json report =
+        bench_report("vae", *device, dtype, timing, weights + inputs.bytes() + executable->plan().arena_bytes());
     report["direction"] = o.encode ? "encode" : "decode";
     report["width"] = o.width;
     report["height"] = o.height;
     report["bytes_beside_weights"] = device->peak_bytes() - weights;
-    add_network(report, *program, timing, vae->parameters(), weights);
+    add_network(report, *executable, timing, vae->parameters(), weights);
     print_report(report, globals);
     return write_profile(*device, o.profile);
 }

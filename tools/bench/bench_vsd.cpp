@@ -77,9 +77,9 @@ Result<Timing> time_decoder(FrameDecoder& decoder, const Vae& vae, const LatentS
 Result<double> gemm_rate(Device& device, DType dtype)
 {
     BenchInputs inputs(device);
-    SR_TRY(const auto program, gemm_program(device, inputs, {}, dtype));
-    SR_TRY(const Timing timing, measure([&] { return program->run(); }));
-    return flops_of(*program) / timing.ms_median / 1e6;
+    SR_TRY(const auto executable, gemm_executable(device, inputs, {}, dtype));
+    SR_TRY(const Timing timing, measure([&] { return executable->run(); }));
+    return flops_of(*executable) / timing.ms_median / 1e6;
 }
 
 void add_shape(Json& report, const BenchVsdArguments& o, const Timing& encode, const Timing& decode)
@@ -147,10 +147,10 @@ Status bench_vsd(const BenchVsdArguments& o, const Globals& globals)
     add_shape(report, o, encode, decode);
     report["gemm_gflops"] = gemm;
     if (step.runs) {
-        add_rate(report, flops_of(vsd->step_program()), step);
+        add_rate(report, flops_of(vsd->step_executable()), step);
         report["share_of_gemm"] = report["gflops"].get<double>() / gemm;
     }
-    add_program(report, vsd->step_program());
+    add_executable(report, vsd->step_executable());
     print_report(report, globals);
     return write_profile(*device, o.profile);
 }

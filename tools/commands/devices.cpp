@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover devices: the devices there are, what they can do, and which variant of each kernel they would run
-#include "kernels/catalogue.h"
+#include "kernels/kernel_registry.h"
 #include "runtime/base/json.h"
 #include "runtime/device/device.h"
 #include "runtime/graph/variant.h"
@@ -21,7 +21,7 @@ using Report = nlohmann::ordered_json;
 Report chosen_kernels(const DeviceLimits& limits)
 {
     Report chosen = Report::object();
-    for (const Kernel* kernel : kernel_catalogue()) {
+    for (const Kernel* kernel : kernel_registry()) {
         const KernelVariant* variant = choose_variant(*kernel, limits);
         const std::string op(kernel->name);
         if (!variant)
@@ -34,9 +34,9 @@ Report chosen_kernels(const DeviceLimits& limits)
 
 bool has_matrix_kernels()
 {
-    for (const Kernel* kernel : kernel_catalogue())
+    for (const Kernel* kernel : kernel_registry())
         for (const KernelVariant& variant : kernel->variants)
-            if (variant.needs & kNeedsCooperativeMatrix)
+            if (variant.features & kFeatureCooperativeMatrix)
                 return true;
     return false;
 }
@@ -57,7 +57,7 @@ Report describe(const DeviceSummary& d)
             {"storage_range_bytes", l.max_storage_range},
             {"texel_elements", l.max_texel_elements},
             {"allocation_bytes", l.max_allocation},
-            {"fp16", (l.needs_supported & kNeedsFloat16) != 0},
+            {"fp16", (l.features & kFeatureFloat16) != 0},
             {"extensions", d.extensions},
             {"kernels", chosen_kernels(l)},
             {"refusal", d.refusal}};
@@ -76,8 +76,7 @@ void print_text(const DeviceSummary& d)
     fmt::print("   buffers         {} of storage, {} texels\n", bytes_text(l.max_storage_range), l.max_texel_elements);
     fmt::print("   workgroups      subgroups of {}, {} of shared memory, {} threads\n", l.subgroup_size,
                bytes_text(l.max_shared_bytes), l.max_group_threads);
-    fmt::print("   fp16            {}\n",
-               l.needs_supported & kNeedsFloat16 ? "arithmetic and storage" : "storage only");
+    fmt::print("   fp16            {}\n", l.features & kFeatureFloat16 ? "arithmetic and storage" : "storage only");
     fmt::print("   extensions      {}{}\n",
                d.extensions.empty() ? "none" : fmt::format("{}", fmt::join(d.extensions, " ")),
                has_matrix_kernels() ? "" : "; this build has no cooperative-matrix kernels");

@@ -40,8 +40,8 @@ uint32_t FoldedWeights::add(const std::string& convolution, const std::string& n
         schema_.push_back({norm + name, {outputs}});
     allow(norm + ".num_batches_tracked");
     const uint32_t depth = shape.taps.height * shape.taps.width * padded(shape.inputs);
-    layer.weight = state_.slot(outputs, depth, DType::f32, convolution + ".weight");
-    layer.bias = state_.slot(1, outputs, DType::f32, convolution + ".bias");
+    layer.weight = state_.tensor(outputs, depth, DType::f32, convolution + ".weight");
+    layer.bias = state_.tensor(1, outputs, DType::f32, convolution + ".bias");
     layers_.push_back(std::move(layer));
     return uint32_t(layers_.size() - 1);
 }

@@ -43,7 +43,7 @@ class FoldedWeights {
     struct Layer {
         std::string convolution, norm;
         Shape shape;
-        Slot weight, bias;
+        DeviceTensor weight, bias;
     };
     Result<std::vector<double>> read(const std::string& name) const;
     static std::array<WeightLayout, 2> layouts_of(const Layer& layer); // weight, bias
@@ -53,7 +53,7 @@ class FoldedWeights {
     SafetensorsSet file_;
     std::vector<Layer> layers_;
     std::vector<TensorSpec> schema_;
-    State state_;
+    TensorPool state_;
 };
 
 } // namespace semrover

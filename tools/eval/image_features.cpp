@@ -3,8 +3,8 @@
 #include "tools/eval/inception.h"
 
 #include "kernels/recognition.h"
-#include "runtime/device/program.h"
-#include "runtime/device/state.h"
+#include "runtime/device/executable.h"
+#include "runtime/device/tensor_pool.h"
 
 #include <cmath>
 #include <cstring>
@@ -16,16 +16,16 @@ struct ImageFeatures::Impl {
     const Inception& network;
     ImageSize size;
     uint32_t batch;
-    State state;
-    Slot pixels, features;
-    std::unique_ptr<Program> program;
+    TensorPool state;
+    DeviceTensor pixels, features;
+    std::unique_ptr<Executable> executable;
 
     Impl(Device& d, const Inception& n, ImageSize s, uint32_t b) : device(d), network(n), size(s), batch(b)
     {
-        pixels = state.slot(batch, words(), DType::u32, "images", words());
+        pixels = state.tensor(batch, words(), DType::u32, "images", words());
         Graph sizes(device.limits()); // to know how large the result is
         const Tensor y = forward(sizes);
-        features = state.slot(y.rows, y.cols, DType::f32, "features");
+        features = state.tensor(y.rows, y.cols, DType::f32, "features");
     }
     uint32_t words() const { return rgb_words(size.height, size.width); }
     Tensor forward(Graph& g) const
@@ -48,7 +48,7 @@ struct ImageFeatures::Impl {
     Status allocate()
     {
         SR_CHECK(state.allocate(device, "images and features"));
-        SR_TRY(program, Program::create(device, graph()));
+        SR_TRY(executable, Executable::create(device, graph()));
         return {};
     }
 };
@@ -88,7 +88,7 @@ Status ImageFeatures::append(std::span<const ImageRgb8> images, Features& featur
         std::memcpy(&words[i * m.words()], image.pixels.data(), image.pixels.size());
     }
     SR_CHECK(m.pixels.write(m.device, words));
-    SR_CHECK(m.program->run());
+    SR_CHECK(m.executable->run());
     SR_TRY(const std::vector<float> rows, m.features.read<float>(m.device));
     const uint32_t ld = m.features.ld();
     for (size_t i = 0; i < images.size(); ++i) {

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/eval/pointnet.h"
 
-#include "runtime/device/program.h"
-#include "runtime/device/state.h"
+#include "runtime/device/executable.h"
+#include "runtime/device/tensor_pool.h"
 
 #include <cmath>
 
@@ -13,16 +13,16 @@ struct PointFeatures::Impl {
     Device& device;
     const Pointnet& network;
     uint32_t batch;
-    State state;
-    Slot positions, inputs, features;
-    std::unique_ptr<Program> program;
+    TensorPool state;
+    DeviceTensor positions, inputs, features;
+    std::unique_ptr<Executable> executable;
 
     Impl(Device& d, const Pointnet& n, uint32_t b) : device(d), network(n), batch(b)
     {
         const PointnetConfig& c = network.config();
-        positions = state.slot(batch * c.points, 4, DType::f32, "points", 4);
-        inputs = state.slot(batch * c.points, c.input_width(), DType::f32, "inputs");
-        features = state.slot(round_up(batch, kImageRowPadding), network.features(), DType::f32, "features");
+        positions = state.tensor(batch * c.points, 4, DType::f32, "points", 4);
+        inputs = state.tensor(batch * c.points, c.input_width(), DType::f32, "inputs");
+        features = state.tensor(round_up(batch, kImageRowPadding), network.features(), DType::f32, "features");
     }
     Graph graph() const
     {
@@ -38,7 +38,7 @@ struct PointFeatures::Impl {
     Status allocate()
     {
         SR_CHECK(state.allocate(device, "points and features"));
-        SR_TRY(program, Program::create(device, graph()));
+        SR_TRY(executable, Executable::create(device, graph()));
         return {};
     }
 };
@@ -79,7 +79,7 @@ Status PointFeatures::append(const PointChunks& chunks, uint32_t first, uint32_t
     }
     SR_CHECK(m.positions.write(m.device, positions));
     SR_CHECK(m.inputs.write_rows(m.device, inputs));
-    SR_CHECK(m.program->run());
+    SR_CHECK(m.executable->run());
     SR_TRY(const std::vector<float> rows, m.features.read_rows(m.device, count));
     features.cols = m.network.features();
     for (uint32_t i = 0; i < count; ++i) {

@@ -3,8 +3,8 @@
 #include "tools/streets/street_grid.h"
 
 #include "engine/scene/cell_reach.h"
-#include "runtime/device/program.h"
-#include "runtime/device/state.h"
+#include "runtime/device/executable.h"
+#include "runtime/device/tensor_pool.h"
 #include "tools/streets/class_label.h"
 #include "tools/trace/trace_scene.h"
 
@@ -133,19 +133,19 @@ Result<std::vector<uint32_t>> seen_cells(Device& device, const Mesh& mesh, const
                                          std::span<const CameraPath> paths, const SeenOptions& options)
 {
     SR_TRY(const DeviceTraceScene scene, DeviceTraceScene::create(device, trace_tables(mesh, {})));
-    State memory;
-    const Slot cast = memory.slot(options.rays, 8, DType::f32, "rays", 8);
-    const Slot hits = memory.slot(options.rays, 4, DType::u32, "hits", 4);
+    TensorPool memory;
+    const DeviceTensor cast = memory.tensor(options.rays, 8, DType::f32, "rays", 8);
+    const DeviceTensor hits = memory.tensor(options.rays, 4, DType::u32, "hits", 4);
     SR_CHECK(memory.allocate(device, "rays"));
     Graph g(device.limits());
     g.keep(trace_rays(g, scene.in(g), cast.in(g)), hits);
-    SR_TRY(const auto program, Program::create(device, g));
+    SR_TRY(const auto executable, Executable::create(device, g));
 
     std::vector<bool> seen(grid.cells.size());
     for (const Point3& eye : eyes_along(paths, options.pose_spacing)) {
         const std::vector<Ray> rays = rays_from(eye, options);
         SR_CHECK(cast.write(device, rays));
-        SR_CHECK(program->run());
+        SR_CHECK(executable->run());
         SR_TRY(const std::vector<Hit> found, hits.read<Hit>(device));
         for (size_t i = 0; i < rays.size(); ++i)
             if (found[i][3] != ~0u)

@@ -241,13 +241,13 @@ Result<DeviceTraceScene> DeviceTraceScene::create(Device& device, const TraceTab
 {
     DeviceTraceScene s;
     const uint64_t limit = std::min(device.limits().max_storage_range, device.limits().max_allocation);
-    const auto declare = [&](Slot& slot, const auto& rows, DType dtype, const char* name) -> Status {
+    const auto declare = [&](DeviceTensor& slot, const auto& rows, DType dtype, const char* name) -> Status {
         const uint64_t bytes = std::as_bytes(std::span(rows)).size(), width = sizeof(rows[0]) / 4;
         if (bytes > limit)
             return fail(ErrorCode::out_of_memory,
                         "a scene of {} triangles and {} texels has a table of {} bytes; this device binds at most {}",
                         t.triangles.size(), t.texels.size(), bytes, limit);
-        slot = s.memory_.slot(std::max(uint32_t(rows.size()), 1u), uint32_t(width), dtype, name, uint32_t(width));
+        slot = s.memory_.tensor(std::max(uint32_t(rows.size()), 1u), uint32_t(width), dtype, name, uint32_t(width));
         return {};
     };
     SR_CHECK(declare(s.nodes_, t.nodes, DType::u32, "tree"));
@@ -256,7 +256,7 @@ Result<DeviceTraceScene> DeviceTraceScene::create(Device& device, const TraceTab
     SR_CHECK(declare(s.materials_, t.materials, DType::u32, "materials"));
     SR_CHECK(declare(s.texels_, t.texels, DType::u32, "texels"));
     SR_CHECK(s.memory_.allocate(device, "traced scene"));
-    const auto write = [&](const Slot& slot, const auto& rows) {
+    const auto write = [&](const DeviceTensor& slot, const auto& rows) {
         return rows.empty() ? Status{} : slot.write(device, rows);
     };
     SR_CHECK(write(s.nodes_, t.nodes));

@@ -7,7 +7,7 @@
 #include "kernels/network.h"
 #include "kernels/trace.h"
 #include "runtime/device/device.h"
-#include "runtime/device/state.h"
+#include "runtime/device/tensor_pool.h"
 
 #include <span>
 
@@ -37,8 +37,8 @@ class DeviceTraceScene {
     TraceScene in(Graph& g) const;
 
   private:
-    State memory_;
-    Slot nodes_, triangles_, corners_, materials_, texels_; // of one row at least
+    TensorPool memory_;
+    DeviceTensor nodes_, triangles_, corners_, materials_, texels_; // of one row at least
 };
 
 } // namespace semrover

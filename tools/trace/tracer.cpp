@@ -85,12 +85,12 @@ Result<std::unique_ptr<Tracer>> Tracer::create(Device& device, const DeviceTrace
 {
     std::unique_ptr<Tracer> t(new Tracer(device));
     t->options_ = options;
-    t->view_ = t->memory_.slot(sizeof(View) / 16, 4, DType::f32, "view", 4);
-    t->picture_ = t->memory_.slot(options.width * options.height, 4, DType::u32, "picture", 4);
+    t->view_ = t->memory_.tensor(sizeof(View) / 16, 4, DType::f32, "view", 4);
+    t->picture_ = t->memory_.tensor(options.width * options.height, 4, DType::u32, "picture", 4);
     SR_CHECK(t->memory_.allocate(device, "traced picture"));
     Graph g(device.limits());
     g.keep(shade(g, scene.in(g), t->view_.in(g), options), t->picture_);
-    SR_TRY(t->program_, Program::create(device, g));
+    SR_TRY(t->executable_, Executable::create(device, g));
     return t;
 }
 
@@ -98,7 +98,7 @@ Result<TracedImage> Tracer::render(const CameraFrame& frame, const Daylight& lig
 {
     const View view = view_of(frame, light);
     SR_CHECK(view_.write(device_, std::span(&view, 1)));
-    SR_CHECK(program_->run());
+    SR_CHECK(executable_->run());
     using Pixel = std::array<uint32_t, 4>;
     SR_TRY(const std::vector<Pixel> pixels, picture_.read<Pixel>(device_));
     TracedImage image{.width = options_.width, .height = options_.height};

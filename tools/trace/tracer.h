@@ -3,8 +3,8 @@
 #pragma once
 
 #include "engine/camera/camera.h"
-#include "runtime/device/program.h"
-#include "runtime/device/state.h"
+#include "runtime/device/executable.h"
+#include "runtime/device/tensor_pool.h"
 #include "tools/trace/trace_scene.h"
 
 #include <memory>
@@ -48,9 +48,9 @@ class Tracer {
 
     Device& device_;
     ShadeOptions options_;
-    State memory_;
-    Slot view_, picture_;
-    std::unique_ptr<Program> program_;
+    TensorPool memory_;
+    DeviceTensor view_, picture_;
+    std::unique_ptr<Executable> executable_;
 };
 
 } // namespace semrover

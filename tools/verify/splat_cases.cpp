@@ -49,10 +49,10 @@ Result<PcaNormalsResult> run_pca_normals(Device& device, std::span<const float> 
     const uint32_t n = uint32_t(positions.size() / 3);
     if (n == 0 || positions.size() % 3 || neighbors < 1 || neighbors > kMaxNeighbors)
         return fail(ErrorCode::bad_input, "pca_normals: {} numbers, {} neighbours", positions.size(), neighbors);
-    State memory;
-    const Slot points = memory.slot(n, 3, DType::f32, "points", 3),
-               normals = memory.slot(n, 4, DType::f32, "normals", 4);
-    const Slot eigenvalues = memory.slot(n, 4, DType::f32, "eigenvalues", 4);
+    TensorPool memory;
+    const DeviceTensor points = memory.tensor(n, 3, DType::f32, "points", 3),
+                       normals = memory.tensor(n, 4, DType::f32, "normals", 4);
+    const DeviceTensor eigenvalues = memory.tensor(n, 4, DType::f32, "eigenvalues", 4);
     SR_CHECK(memory.allocate(device, "points"));
     SR_CHECK(points.write(device, positions));
     Graph g(device.limits());
@@ -60,8 +60,8 @@ Result<PcaNormalsResult> run_pca_normals(Device& device, std::span<const float> 
     const PcaNormals y = pca_normal(g, x, knn(g, x, {.neighbors = neighbors}));
     g.keep(y.normals, normals);
     g.keep(y.eigenvalues, eigenvalues);
-    SR_TRY(const auto program, Program::create(device, g));
-    SR_CHECK(program->run());
+    SR_TRY(const auto executable, Executable::create(device, g));
+    SR_CHECK(executable->run());
     PcaNormalsResult out;
     for (const auto& [slot, values] : {std::pair{normals, &out.normals}, {eigenvalues, &out.eigenvalues}}) {
         SR_TRY(const std::vector<float> rows, slot.read<float>(device));

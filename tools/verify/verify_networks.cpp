@@ -4,8 +4,8 @@
 #include "engine/network/unet.h"
 #include "engine/network/vae.h"
 #include "runtime/base/json.h"
-#include "runtime/device/program.h"
-#include "runtime/device/state.h"
+#include "runtime/device/executable.h"
+#include "runtime/device/tensor_pool.h"
 #include "tools/verify/golden_case.h"
 
 #include <numeric>
@@ -53,22 +53,22 @@ std::vector<float> from_rows(const std::vector<float>& rows, const Shape& s)
 // runs the graph and reads the fp32 feature map `y` as NCHW
 Result<std::vector<float>> run_and_read(Device& device, Graph& g, const FeatureMap& y)
 {
-    State state;
-    const Slot out = state.slot(y.data.rows, y.channels(), DType::f32, "output");
+    TensorPool state;
+    const DeviceTensor out = state.tensor(y.data.rows, y.channels(), DType::f32, "output");
     SR_CHECK(state.allocate(device, "golden case"));
     g.keep(y.data, out);
-    SR_TRY(const auto program, Program::create(device, g));
-    SR_CHECK(program->run());
+    SR_TRY(const auto executable, Executable::create(device, g));
+    SR_CHECK(executable->run());
     SR_TRY(const std::vector<float> rows, out.read_rows(device, out.rows()));
     return from_rows(rows, {y.batch, y.channels(), y.height, y.width});
 }
 
-Slot input_slot(State& state, const Shape& s, DType dtype)
+DeviceTensor input_slot(TensorPool& state, const Shape& s, DType dtype)
 {
-    return state.slot(s.images * round_up(s.height * s.width, kImageRowPadding), s.channels, dtype, "input");
+    return state.tensor(s.images * round_up(s.height * s.width, kImageRowPadding), s.channels, dtype, "input");
 }
 
-FeatureMap input_map(Graph& g, const Slot& slot, const Shape& s)
+FeatureMap input_map(Graph& g, const DeviceTensor& slot, const Shape& s)
 {
     return {slot.in(g), s.images, s.height, s.width};
 }
@@ -161,25 +161,25 @@ Result<VideoInput> video_input(const GoldenCase& c, const UnetConfig& config)
 
 // what a UNet of videos reads, and the tables that are made once
 struct VideoSlots {
-    State state;
-    Slot x, text, steps, added, numbers, video, image, number;
-    Slot times, frames, keys;
+    TensorPool state;
+    DeviceTensor x, text, steps, added, numbers, video, image, number;
+    DeviceTensor times, frames, keys;
 
     VideoSlots(const Unet& unet, const VideoInput& in)
     {
         const UnetConfig& c = unet.config();
         const DType precision = unet.precision();
         x = input_slot(state, in.shape, precision);
-        text = state.slot(in.videos * in.tokens, c.cross_attention_dim, precision, "context");
-        steps = state.slot(in.videos, 1, DType::f32, "timesteps", 1);
-        added = state.slot(in.videos, c.added_numbers, DType::f32, "added", c.added_numbers);
-        numbers = state.slot(in.frames, 1, DType::f32, "frame numbers", 1);
-        video = state.slot(in.videos, 1, DType::u32, "table_row", 1);
-        image = state.slot(in.shape.images, 1, DType::u32, "table_row", 1);
-        number = state.slot(in.shape.images, 1, DType::u32, "frame_row", 1);
-        times = state.slot(in.videos, unet.time_width(), DType::f32, "times");
-        frames = state.slot(in.frames, unet.frame_width(), DType::f32, "frames");
-        keys = state.slot(in.videos * in.tokens, unet.context_width(), precision, "keys and values");
+        text = state.tensor(in.videos * in.tokens, c.cross_attention_dim, precision, "context");
+        steps = state.tensor(in.videos, 1, DType::f32, "timesteps", 1);
+        added = state.tensor(in.videos, c.added_numbers, DType::f32, "added", c.added_numbers);
+        numbers = state.tensor(in.frames, 1, DType::f32, "frame numbers", 1);
+        video = state.tensor(in.videos, 1, DType::u32, "table_row", 1);
+        image = state.tensor(in.shape.images, 1, DType::u32, "table_row", 1);
+        number = state.tensor(in.shape.images, 1, DType::u32, "frame_row", 1);
+        times = state.tensor(in.videos, unet.time_width(), DType::f32, "times");
+        frames = state.tensor(in.frames, unet.frame_width(), DType::f32, "frames");
+        keys = state.tensor(in.videos * in.tokens, unet.context_width(), precision, "keys and values");
     }
     Status write(Device& device, const VideoInput& in) const
     {
@@ -220,8 +220,8 @@ Result<GoldenOutputs> run_vae(Device& device, const GoldenCase& c, const VaeConf
     SR_TRY(const auto vae, Vae::load(device, config, weights, precision));
     SR_TRY(const Shape image, shape_of(c, "input.image"));
     SR_TRY(const Shape latent, shape_of(c, "input.latent"));
-    State state;
-    const Slot pixels = input_slot(state, image, DType::f32), values = input_slot(state, latent, DType::f32);
+    TensorPool state;
+    const DeviceTensor pixels = input_slot(state, image, DType::f32), values = input_slot(state, latent, DType::f32);
     SR_CHECK(state.allocate(device, "golden case"));
     SR_CHECK(pixels.write_rows(device, to_rows(c.floats("input.image"), image)));
     SR_CHECK(values.write_rows(device, to_rows(c.floats("input.latent"), latent)));
@@ -246,11 +246,11 @@ Result<GoldenOutputs> run_unet_2d_condition(Device& device, const GoldenCase& c,
     SR_TRY(const auto unet, Unet::load(device, config, weights, precision));
     SR_TRY(const UnetInput input, unet_input(c, config));
     const uint32_t images = input.shape.images;
-    State state;
-    const Slot x = input_slot(state, input.shape, precision);
-    const Slot text = state.slot(images * input.tokens, config.cross_attention_dim, precision, "context");
-    const Slot steps = state.slot(images, 1, DType::f32, "timesteps", 1);
-    const Slot rows = state.slot(images, 1, DType::u32, "table_row", 1);
+    TensorPool state;
+    const DeviceTensor x = input_slot(state, input.shape, precision);
+    const DeviceTensor text = state.tensor(images * input.tokens, config.cross_attention_dim, precision, "context");
+    const DeviceTensor steps = state.tensor(images, 1, DType::f32, "timesteps", 1);
+    const DeviceTensor rows = state.tensor(images, 1, DType::u32, "table_row", 1);
     SR_CHECK(state.allocate(device, "golden case"));
     SR_CHECK(x.write_rows(device, input.sample));
     SR_CHECK(text.write_rows(device, input.text));
@@ -277,7 +277,7 @@ Result<GoldenOutputs> run_unet_spatio_temporal_condition(Device& device, const G
     VideoSlots slots(*unet, in);
     SR_CHECK(slots.state.allocate(device, "golden case"));
     SR_CHECK(slots.write(device, in));
-    SR_TRY(const auto tables, Program::create(device, slots.tables_graph(device.limits(), *unet)));
+    SR_TRY(const auto tables, Executable::create(device, slots.tables_graph(device.limits(), *unet)));
     SR_CHECK(tables->run());
     Graph g(device.limits());
     const Unet::Context context{slots.keys.in(g), in.tokens, in.tokens};

@@ -4,8 +4,8 @@
 #include "engine/sampling/repaint.h"
 #include "engine/voxfield/regions.h"
 #include "kernels/sampling.h"
-#include "runtime/device/program.h"
-#include "runtime/device/state.h"
+#include "runtime/device/executable.h"
+#include "runtime/device/tensor_pool.h"
 #include "shaders/lib/step_row.h"
 #include "tools/verify/golden_case.h"
 
@@ -20,19 +20,19 @@ class StepRunner {
     {
         auto r = std::unique_ptr<StepRunner>(new StepRunner(device));
         constexpr uint32_t kWords = sizeof(StepRow) / 4;
-        r->steps_ = r->state_.slot(uint32_t(schedule.steps.size()), kWords, DType::u32, "steps", kWords);
-        r->clock_ = r->state_.slot(1, 2, DType::u32, "clock", 2);
-        for (Slot* slot : {&r->m_, &r->z_, &r->fixed_, &r->x_, &r->x0_})
-            *slot = r->state_.slot(1, elements, DType::f32, "row");
-        r->known_ = r->state_.slot(1, 1, DType::u32, "known", 1);
+        r->steps_ = r->state_.tensor(uint32_t(schedule.steps.size()), kWords, DType::u32, "steps", kWords);
+        r->clock_ = r->state_.tensor(1, 2, DType::u32, "clock", 2);
+        for (DeviceTensor* slot : {&r->m_, &r->z_, &r->fixed_, &r->x_, &r->x0_})
+            *slot = r->state_.tensor(1, elements, DType::f32, "row");
+        r->known_ = r->state_.tensor(1, 1, DType::u32, "known", 1);
         SR_CHECK(r->state_.allocate(device, "golden case"));
         std::vector<StepRow> rows;
         for (const StepCoefficients& c : schedule.steps)
             rows.push_back(step_row({.coefficients = c}));
         SR_CHECK(r->steps_.write(device, rows));
-        for (const Slot& slot : {r->clock_, r->known_, r->fixed_, r->x0_, r->z_})
+        for (const DeviceTensor& slot : {r->clock_, r->known_, r->fixed_, r->x0_, r->z_})
             SR_CHECK(slot.clear(device));
-        SR_TRY(r->program_, r->build(float(schedule.clip)));
+        SR_TRY(r->executable_, r->build(float(schedule.clip)));
         return r;
     }
     Status set_state(std::span<const float> x) { return x_.write_rows(device_, x); }
@@ -41,25 +41,25 @@ class StepRunner {
         SR_CHECK(m_.write_rows(device_, m));
         if (!z.empty())
             SR_CHECK(z_.write_rows(device_, z));
-        SR_CHECK(program_->run());
+        SR_CHECK(executable_->run());
         return x_.read_rows(device_, 1);
     }
 
   private:
     explicit StepRunner(Device& device) : device_(device) {}
-    Result<std::unique_ptr<Program>> build(float clip)
+    Result<std::unique_ptr<Executable>> build(float clip)
     {
         Graph g(device_.limits());
         const StepTable table{steps_.in(g), clock_.in(g)};
         step_update(g, table, m_.in(g), z_.in(g), known_.in(g), fixed_.in(g), x_.in(g), x0_.in(g), 1, clip);
         step_advance(g, table.clock);
-        return Program::create(device_, g);
+        return Executable::create(device_, g);
     }
 
     Device& device_;
-    State state_;
-    Slot steps_, clock_, m_, z_, fixed_, x_, x0_, known_;
-    std::unique_ptr<Program> program_;
+    TensorPool state_;
+    DeviceTensor steps_, clock_, m_, z_, fixed_, x_, x0_, known_;
+    std::unique_ptr<Executable> executable_;
 };
 
 } // namespace

@@ -55,24 +55,25 @@ Result<std::vector<float>> evaluate(Device& device, const Transformer& t, const 
     const uint32_t m = in.sets.rows(), c = t.config().channels(), d = t.config().dim(),
                    words = divide_up(in.sets.longest, 32);
     const uint32_t times = uint32_t(in.timesteps.size());
-    State state;
+    TensorPool state;
     const auto array = [&](uint32_t rows, uint32_t width, DType dtype, const char* name) {
-        return state.slot(rows, width, dtype, name, width);
+        return state.tensor(rows, width, dtype, name, width);
     };
-    const Slot labels = array(m, 1, DType::u32, "labels"), cells = array(m, 4, DType::i32, "cells"),
-               sets = array(m, 2, DType::u32, "sets"), coords = array(m, 3, DType::f32, "coords"),
-               tiles = array(uint32_t(in.sets.tiles.size() / 4), 4, DType::u32, "tiles"),
-               mask = array(m, words, DType::u32, "mask"), rows = array(2 * m, 1, DType::u32, "table_row"),
-               timesteps = array(times, 1, DType::f32, "timesteps"), pos = state.slot(m, d, t.precision(), "pos"),
-               tokens = state.slot(m, c, t.precision(), "tokens"),
-               modulations = state.slot(times, t.modulation_width(), DType::f32, "modulations"),
-               out = state.slot(m, c, DType::f32, "out");
-    Slot condition, conditioning, voxel_conditioning;
+    const DeviceTensor labels = array(m, 1, DType::u32, "labels"), cells = array(m, 4, DType::i32, "cells"),
+                       sets = array(m, 2, DType::u32, "sets"), coords = array(m, 3, DType::f32, "coords"),
+                       tiles = array(uint32_t(in.sets.tiles.size() / 4), 4, DType::u32, "tiles"),
+                       mask = array(m, words, DType::u32, "mask"), rows = array(2 * m, 1, DType::u32, "table_row"),
+                       timesteps = array(times, 1, DType::f32, "timesteps"),
+                       pos = state.tensor(m, d, t.precision(), "pos"),
+                       tokens = state.tensor(m, c, t.precision(), "tokens"),
+                       modulations = state.tensor(times, t.modulation_width(), DType::f32, "modulations"),
+                       out = state.tensor(m, c, DType::f32, "out");
+    DeviceTensor condition, conditioning, voxel_conditioning;
     if (!in.condition.empty()) {
-        condition = state.slot(m, t.config().condition_width(), t.precision(), "condition");
-        conditioning = state.slot(m, d, t.precision(), "conditioning");
+        condition = state.tensor(m, t.config().condition_width(), t.precision(), "condition");
+        conditioning = state.tensor(m, d, t.precision(), "conditioning");
         if (t.config().condition_voxels)
-            voxel_conditioning = state.slot(m, d, t.precision(), "voxel conditioning");
+            voxel_conditioning = state.tensor(m, d, t.precision(), "voxel conditioning");
     }
     SR_CHECK(state.allocate(device, "golden case"));
     SR_CHECK(labels.write(device, in.sets.labels));
@@ -101,8 +102,8 @@ Result<std::vector<float>> evaluate(Device& device, const Transformer& t, const 
     }
     t.modulations(g, timesteps.in(g), modulations.in(g));
     g.keep(t.forward(g, tokens.in(g), context, modulations.in(g), rows.in(g)), out);
-    SR_TRY(const auto program, Program::create(device, g));
-    SR_CHECK(program->run());
+    SR_TRY(const auto executable, Executable::create(device, g));
+    SR_CHECK(executable->run());
     return out.read_rows(device, m);
 }
 

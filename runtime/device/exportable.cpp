@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/device/sharing.h"
+#include "runtime/device/exportable.h"
 
 #include "runtime/device/physical_device.h"
 
@@ -13,7 +13,7 @@ namespace {
 VkExternalMemoryFeatureFlags buffer_features(const VulkanCalls& vk, VkPhysicalDevice physical)
 {
     auto asked = vk_struct<VkPhysicalDeviceExternalBufferInfo>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_BUFFER_INFO);
-    asked.usage = kSharedUsage;
+    asked.usage = kExportedUsage;
     asked.handleType = VK_EXTERNAL_MEMORY_HANDLE_TYPE_OPAQUE_FD_BIT;
     auto found = vk_struct<VkExternalBufferProperties>(VK_STRUCTURE_TYPE_EXTERNAL_BUFFER_PROPERTIES);
     vk.GetPhysicalDeviceExternalBufferProperties(physical, &asked, &found);
@@ -32,9 +32,9 @@ bool exports_semaphores(const VulkanCalls& vk, VkPhysicalDevice physical)
 
 } // namespace
 
-Sharing sharing_of(const VulkanCalls& vk, VkPhysicalDevice physical)
+Exportable exportable_of(const VulkanCalls& vk, VkPhysicalDevice physical)
 {
-    Sharing s;
+    Exportable s;
     s.memory = has_extension(vk, physical, VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME) &&
                buffer_features(vk, physical) & VK_EXTERNAL_MEMORY_FEATURE_EXPORTABLE_BIT;
     s.semaphores =
@@ -58,9 +58,9 @@ DriverIds driver_ids(const Device& device)
     return found;
 }
 
-Result<std::unique_ptr<SharedSemaphore>> SharedSemaphore::create(Device& device)
+Result<std::unique_ptr<ExportedSemaphore>> ExportedSemaphore::create(Device& device)
 {
-    std::unique_ptr<SharedSemaphore> s(new SharedSemaphore(device));
+    std::unique_ptr<ExportedSemaphore> s(new ExportedSemaphore(device));
     auto exported = vk_struct<VkExportSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_EXPORT_SEMAPHORE_CREATE_INFO);
     exported.handleTypes = VK_EXTERNAL_SEMAPHORE_HANDLE_TYPE_OPAQUE_FD_BIT;
     auto info = vk_struct<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO, &exported);
@@ -68,7 +68,7 @@ Result<std::unique_ptr<SharedSemaphore>> SharedSemaphore::create(Device& device)
     return s;
 }
 
-SharedSemaphore::~SharedSemaphore()
+ExportedSemaphore::~ExportedSemaphore()
 {
     if (!semaphore_)
         return;
@@ -76,7 +76,7 @@ SharedSemaphore::~SharedSemaphore()
     device_.vk().DestroySemaphore(device_.handle(), semaphore_, device_.vk().allocator());
 }
 
-Result<int> SharedSemaphore::descriptor() const
+Result<int> ExportedSemaphore::descriptor() const
 {
     auto info = vk_struct<VkSemaphoreGetFdInfoKHR>(VK_STRUCTURE_TYPE_SEMAPHORE_GET_FD_INFO_KHR);
     info.semaphore = semaphore_;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/device/program.h"
+#include "runtime/device/executable.h"
 
 #include "runtime/device/command.h"
 #include "runtime/device/debug_names.h"
@@ -11,15 +11,15 @@
 
 namespace semrover {
 
-Result<std::unique_ptr<Program>> Program::create(Device& device, const Graph& graph)
+Result<std::unique_ptr<Executable>> Executable::create(Device& device, const Graph& graph)
 {
     SR_TRY(Plan plan, make_plan(graph, device.costs()));
     return create(device, std::move(plan));
 }
 
-Result<std::unique_ptr<Program>> Program::create(Device& device, Plan plan)
+Result<std::unique_ptr<Executable>> Executable::create(Device& device, Plan plan)
 {
-    std::unique_ptr<Program> p(new Program(device, std::move(plan)));
+    std::unique_ptr<Executable> p(new Executable(device, std::move(plan)));
     p->measuring_ = device.limits().submit_seconds > 0 && device.timestamp_ns() > 0 && !p->plan_.passes.empty();
     SR_CHECK(p->choose_alternatives());
     SR_CHECK(p->allocate());
@@ -30,7 +30,7 @@ Result<std::unique_ptr<Program>> Program::create(Device& device, Plan plan)
     return p;
 }
 
-Program::~Program()
+Executable::~Executable()
 {
     (void)device_.wait(device_.last_ticket()); // command buffers may be in flight; a lost device is reported elsewhere
     for (VkBufferView view : views_)
@@ -43,7 +43,7 @@ Program::~Program()
         device_.vk().DestroyCommandPool(device_.handle(), commands_pool_, device_.vk().allocator());
 }
 
-Status Program::choose_alternatives()
+Status Executable::choose_alternatives()
 {
     if (!measuring_ || !device_.autotunes())
         return {};
@@ -53,7 +53,7 @@ Status Program::choose_alternatives()
     return {};
 }
 
-Status Program::allocate()
+Status Executable::allocate()
 {
     for (uint64_t bytes : plan_.blocks) {
         SR_TRY(auto block, Buffer::create(device_, bytes, MemoryKind::device, "graph arena"));
@@ -64,14 +64,14 @@ Status Program::allocate()
 
 // Vulkan wants a buffer at every binding, also at one that the shader does not use: of those that are given, one that
 // is read or written as it
-const PassBinding& Program::stand_in(const Pass& pass, size_t binding)
+const PassBinding& Executable::stand_in(const Pass& pass, size_t binding)
 {
     const auto alike = [&](const PassBinding& b) { return b.given() && b.access == pass.bindings[binding].access; };
     const auto found = std::ranges::find_if(pass.bindings, alike);
     return found == pass.bindings.end() ? *std::ranges::find_if(pass.bindings, &PassBinding::given) : *found;
 }
 
-std::pair<VkBuffer, uint64_t> Program::locate(const PassBinding& b) const
+std::pair<VkBuffer, uint64_t> Executable::locate(const PassBinding& b) const
 {
     const Resource& r = plan_.resources[b.resource];
     SR_ASSERT(!r.external || r.memory.buffer, "'{}' has no memory: the graph was only good for planning", r.name);
@@ -81,13 +81,13 @@ std::pair<VkBuffer, uint64_t> Program::locate(const PassBinding& b) const
     return {blocks_[p.block]->handle(), p.offset + b.offset};
 }
 
-Status Program::get_pipelines()
+Status Executable::get_pipelines()
 {
     SR_TRY(pipelines_, device_.pipelines().get(plan_.passes));
     return {};
 }
 
-Status Program::make_sets()
+Status Executable::make_sets()
 {
     uint32_t storage = 0, texel = 0;
     std::vector<VkDescriptorSetLayout> layouts;
@@ -116,7 +116,7 @@ Status Program::make_sets()
     return {};
 }
 
-Status Program::bind(const Pass& pass, VkDescriptorSet set)
+Status Executable::bind(const Pass& pass, VkDescriptorSet set)
 {
     const size_t n = pass.bindings.size();
     std::vector<VkWriteDescriptorSet> writes(n,
@@ -151,7 +151,7 @@ Status Program::bind(const Pass& pass, VkDescriptorSet set)
     return {};
 }
 
-Status Program::make_queries()
+Status Executable::make_queries()
 {
     if (!device_.profile() && !measuring_)
         return {};
@@ -162,7 +162,7 @@ Status Program::make_queries()
     return {};
 }
 
-Status Program::record()
+Status Executable::record()
 {
     auto pool = vk_struct<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
     pool.queueFamilyIndex = device_.queue_family();
@@ -179,7 +179,7 @@ Status Program::record()
     return {};
 }
 
-Status Program::record_submit(uint32_t index)
+Status Executable::record_submit(uint32_t index)
 {
     const VkCommandBuffer commands = commands_[index];
     SR_CHECK(begin_commands(device_.vk(), commands, false));
@@ -188,13 +188,13 @@ Status Program::record_submit(uint32_t index)
     return {};
 }
 
-void Program::record_into(VkCommandBuffer commands) const
+void Executable::record_into(VkCommandBuffer commands) const
 {
     for (uint32_t i = 0; i < plan_.submits; ++i)
         record_passes(commands, i, false);
 }
 
-void Program::record_passes(VkCommandBuffer commands, uint32_t submit, bool timed) const
+void Executable::record_passes(VkCommandBuffer commands, uint32_t submit, bool timed) const
 {
     uint32_t level = ~0u;
     for (size_t i = 0; i < plan_.dispatches.size(); ++i) {
@@ -210,7 +210,7 @@ void Program::record_passes(VkCommandBuffer commands, uint32_t submit, bool time
 }
 
 // a pass, and what it reads and writes outside of the graph, such as its weights
-std::string Program::label_of(const Pass& pass) const
+std::string Executable::label_of(const Pass& pass) const
 {
     std::string label = pass.name();
     for (const PassBinding& b : pass.bindings)
@@ -219,7 +219,7 @@ std::string Program::label_of(const Pass& pass) const
     return label;
 }
 
-void Program::record_dispatch(VkCommandBuffer commands, size_t index, bool timed) const
+void Executable::record_dispatch(VkCommandBuffer commands, size_t index, bool timed) const
 {
     const Dispatch& d = plan_.dispatches[index];
     const Pass& pass = plan_.passes[d.pass];
@@ -244,7 +244,7 @@ void Program::record_dispatch(VkCommandBuffer commands, size_t index, bool timed
         device_.vk().CmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, queries_, query + 1);
 }
 
-Result<uint64_t> Program::submit()
+Result<uint64_t> Executable::submit()
 {
     SR_CHECK(device_.check_cancelled());
     if (measuring_ && runs_ > 0)
@@ -259,14 +259,14 @@ Result<uint64_t> Program::submit()
     return ticket;
 }
 
-Status Program::run()
+Status Executable::run()
 {
     SR_TRY(const uint64_t ticket, submit());
     SR_CHECK(device_.wait(ticket));
     return device_.profile() ? collect_profile() : Status{};
 }
 
-Result<std::vector<uint64_t>> Program::stamps() const
+Result<std::vector<uint64_t>> Executable::stamps() const
 {
     std::vector<uint64_t> out(plan_.dispatches.size() * 2);
     SR_VK(device_.vk().GetQueryPoolResults(device_.handle(), queries_, 0, uint32_t(out.size()), out.size() * 8,
@@ -275,7 +275,7 @@ Result<std::vector<uint64_t>> Program::stamps() const
 }
 
 // by what the run before took, with the next alternatives to try
-Status Program::schedule_again()
+Status Executable::schedule_again()
 {
     SR_CHECK(device_.wait(device_.last_ticket()));
     SR_TRY(const std::vector<uint64_t> stamps, stamps());
@@ -287,7 +287,7 @@ Status Program::schedule_again()
     for (size_t i = 0; i < plan_.passes.size(); ++i) {
         const Pass& pass = plan_.passes[i];
         device_.costs().learn(pass, seconds[i]);
-        if (pass.options.most_operations > 0)
+        if (pass.options.max_flops > 0)
             seconds[i] = std::max(seconds[i], device_.costs().seconds(pass));
     }
     if (autotuner_.running()) {
@@ -304,7 +304,7 @@ Status Program::schedule_again()
     return record();
 }
 
-Status Program::collect_profile()
+Status Executable::collect_profile()
 {
     if (!queries_ || !device_.profile())
         return {};

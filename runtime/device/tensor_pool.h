@@ -14,13 +14,13 @@ namespace semrover {
 
 class Graph;
 struct DeviceLimits;
-struct StateMemory; // items of a State, and its blocks once they are there
+struct TensorPoolMemory; // items of a TensorPool, and its blocks once they are there
 
-// A matrix of a State. Cheap to copy, and good as long as its State is, wherever that is moved to. Its memory is there
-// from State::allocate() on; before, its tensors are good for planning.
-class Slot {
+// A matrix of a TensorPool. Cheap to copy, and good as long as its TensorPool is, wherever that is moved to. Its memory
+// is there from TensorPool::allocate() on; before, its tensors are good for planning.
+class DeviceTensor {
   public:
-    Slot() = default; // none
+    DeviceTensor() = default; // none
 
     bool valid() const { return memory_ != nullptr; }
     uint32_t rows() const { return shape_.rows; }
@@ -29,13 +29,16 @@ class Slot {
     DType dtype() const { return shape_.dtype; }
     uint64_t bytes() const { return shape_.bytes(); }
     const std::string& name() const;
-    bool same_as(const Slot& other) const { return memory_ == other.memory_ && item_ == other.item_; } // or its rows
+    bool same_as(const DeviceTensor& other) const
+    {
+        return memory_ == other.memory_ && item_ == other.item_;
+    } // or its rows
 
     // the tensor in a graph: of one resource, however often it is asked for; none of none
     Tensor in(Graph& g) const;
     BufferSlice slice() const;
 
-    Slot row_range(uint32_t first, uint32_t count) const;
+    DeviceTensor row_range(uint32_t first, uint32_t count) const;
 
     // Copies, after everything submitted so far. Elements as they lie, rows() * ld() of them:
     template <typename Range>
@@ -56,33 +59,37 @@ class Slot {
     Status clear(Device& device) const;
 
   private:
-    friend class State;
-    Slot(StateMemory* memory, uint32_t item, const Tensor& shape) : memory_(memory), item_(item), shape_(shape) {}
+    friend class TensorPool;
+    DeviceTensor(TensorPoolMemory* memory, uint32_t item, const Tensor& shape)
+        : memory_(memory), item_(item), shape_(shape)
+    {
+    }
     Status write_bytes(Device& device, std::span<const std::byte> bytes) const;
     Status read_bytes(Device& device, std::span<std::byte> bytes) const;
 
-    StateMemory* memory_ = nullptr;
+    TensorPoolMemory* memory_ = nullptr;
     uint32_t item_ = 0;
     Tensor shape_; // of no resource; its offset counts from the item's start
 };
 
-// Typed memory that outlives graphs: weights, inputs, outputs, what stays from one run to the next. First every slot is
-// declared, which is the only place that says its size; then all of them are allocated, in blocks of at most the
+// Typed memory that outlives graphs: weights, inputs, outputs, what stays from one run to the next. First every tensor
+// is declared, which is the only place that says its size; then all of them are allocated, in blocks of at most the
 // device's largest allocation, so that the sum is known before anything exists.
-class State {
+class TensorPool {
   public:
-    State();
-    ~State();
-    State(State&&) noexcept;
-    State& operator=(State&&) noexcept;
+    TensorPool();
+    ~TensorPool();
+    TensorPool(TensorPool&&) noexcept;
+    TensorPool& operator=(TensorPool&&) noexcept;
 
     // ld = 0: rows padded to kRowPadding elements
-    [[nodiscard]] Slot slot(uint32_t rows, uint32_t cols, DType dtype, std::string_view name, uint32_t ld = 0);
+    [[nodiscard]] DeviceTensor tensor(uint32_t rows, uint32_t cols, DType dtype, std::string_view name,
+                                      uint32_t ld = 0);
     uint64_t planned_bytes(const DeviceLimits& limits) const;
     Status allocate(Device& device, const char* label); // label: in the error when there is not enough memory
 
   private:
-    std::unique_ptr<StateMemory> memory_;
+    std::unique_ptr<TensorPoolMemory> memory_;
 };
 
 } // namespace semrover

@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 namespace semrover {
-namespace engine_replay_test {
+namespace engine_step_loop_test {
 
 const Path kGolden = SEMROVER_SOURCE_DIR "/tests/golden";
 const LatentSize kSize{51, 38, 8};
@@ -105,7 +105,7 @@ struct FrameRun {
 };
 
 template <typename Kind>
-class engine_replay : public ::testing::Test {
+class engine_step_loop : public ::testing::Test {
   public:
     Kind run;
 
@@ -131,9 +131,9 @@ class engine_replay : public ::testing::Test {
 };
 
 using Runs = ::testing::Types<TokenRun, FrameRun>;
-TYPED_TEST_SUITE(engine_replay, Runs);
+TYPED_TEST_SUITE(engine_step_loop, Runs);
 
-TYPED_TEST(engine_replay, gives_the_same_bytes_however_many_rows_are_submitted_at_a_time)
+TYPED_TEST(engine_step_loop, gives_the_same_bytes_however_many_rows_are_submitted_at_a_time)
 {
     const std::vector<float> whole = this->uninterrupted();
     const auto s = this->run.make();
@@ -145,7 +145,7 @@ TYPED_TEST(engine_replay, gives_the_same_bytes_however_many_rows_are_submitted_a
     }
 }
 
-TYPED_TEST(engine_replay, stopped_after_any_row_the_next_run_is_as_if_there_had_been_none)
+TYPED_TEST(engine_step_loop, stopped_after_any_row_the_next_run_is_as_if_there_had_been_none)
 {
     const std::vector<float> whole = this->uninterrupted();
     const auto s = this->run.make();
@@ -159,7 +159,7 @@ TYPED_TEST(engine_replay, stopped_after_any_row_the_next_run_is_as_if_there_had_
     EXPECT_EQ(this->rest(*s, 1), whole);
 }
 
-TEST(engine_replay_of_two, in_turns_on_one_device_disturb_each_other_in_nothing)
+TEST(engine_step_loop_of_two, in_turns_on_one_device_disturb_each_other_in_nothing)
 {
     const TokenRun tokens;
     const FrameRun frame;
@@ -182,7 +182,7 @@ TEST(engine_replay_of_two, in_turns_on_one_device_disturb_each_other_in_nothing)
     EXPECT_EQ(*renderer->finish(), latent);
 }
 
-TEST(engine_replay_of_two, a_step_without_a_run_is_the_callers_mistake)
+TEST(engine_step_loop_of_two, a_step_without_a_run_is_the_callers_mistake)
 {
     const TokenRun tokens;
     const auto sampler = tokens.make();
@@ -193,5 +193,5 @@ TEST(engine_replay_of_two, a_step_without_a_run_is_the_callers_mistake)
     EXPECT_DEATH((void)sampler->step(1), "a step of a run that has not begun, or has ended");
 }
 
-} // namespace engine_replay_test
+} // namespace engine_step_loop_test
 } // namespace semrover

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/device/state.h"
+#include "runtime/device/tensor_pool.h"
 
 #include "runtime/device/device.h"
 
@@ -8,7 +8,7 @@
 
 namespace semrover {
 
-struct StateMemory {
+struct TensorPoolMemory {
     struct Item {
         std::string name;
         uint64_t bytes, offset = 0;
@@ -38,47 +38,47 @@ struct StateMemory {
     }
 };
 
-const std::string& Slot::name() const
+const std::string& DeviceTensor::name() const
 {
     return memory_->items[item_].name;
 }
 
-Tensor Slot::in(Graph& g) const
+Tensor DeviceTensor::in(Graph& g) const
 {
     if (!valid())
         return {};
     Tensor t = shape_;
-    t.resource = g.outside(memory_, item_, memory_->slice(item_), name());
+    t.resource = g.resource_of(memory_, item_, memory_->slice(item_), name());
     return t;
 }
 
-BufferSlice Slot::slice() const
+BufferSlice DeviceTensor::slice() const
 {
     return memory_->slice(item_).part(shape_.offset, bytes());
 }
 
-Slot Slot::row_range(uint32_t first, uint32_t count) const
+DeviceTensor DeviceTensor::row_range(uint32_t first, uint32_t count) const
 {
     SR_ASSERT(uint64_t(first) + count <= rows(), "rows {} to {} of '{}', which has {}", first, uint64_t(first) + count,
               name(), rows());
     return {memory_, item_, shape_.row_range(first, count)};
 }
 
-Status Slot::write_bytes(Device& device, std::span<const std::byte> bytes) const
+Status DeviceTensor::write_bytes(Device& device, std::span<const std::byte> bytes) const
 {
     SR_ASSERT(bytes.size() == this->bytes(), "{} bytes written to '{}', which has {}", bytes.size(), name(),
               this->bytes());
     return device.write(slice(), bytes);
 }
 
-Status Slot::read_bytes(Device& device, std::span<std::byte> bytes) const
+Status DeviceTensor::read_bytes(Device& device, std::span<std::byte> bytes) const
 {
     SR_ASSERT(bytes.size() == this->bytes(), "{} bytes read from '{}', which has {}", bytes.size(), name(),
               this->bytes());
     return device.read(slice(), bytes);
 }
 
-Status Slot::write_rows(Device& device, std::span<const float> values) const
+Status DeviceTensor::write_rows(Device& device, std::span<const float> values) const
 {
     SR_ASSERT((dtype() == DType::f32 || dtype() == DType::f16) && values.size() % cols() == 0 &&
                   values.size() / cols() <= rows(),
@@ -89,9 +89,9 @@ Status Slot::write_rows(Device& device, std::span<const float> values) const
     return write_bytes(device, bytes);
 }
 
-Result<std::vector<float>> Slot::read_rows(Device& device, uint32_t count) const
+Result<std::vector<float>> DeviceTensor::read_rows(Device& device, uint32_t count) const
 {
-    const Slot some = row_range(0, count);
+    const DeviceTensor some = row_range(0, count);
     std::vector<std::byte> bytes(some.bytes());
     SR_CHECK(some.read_bytes(device, bytes));
     std::vector<float> values(size_t(count) * cols());
@@ -101,17 +101,17 @@ Result<std::vector<float>> Slot::read_rows(Device& device, uint32_t count) const
     return values;
 }
 
-Status Slot::clear(Device& device) const
+Status DeviceTensor::clear(Device& device) const
 {
     return device.clear(slice());
 }
 
-State::State() : memory_(std::make_unique<StateMemory>()) {}
-State::~State() = default;
-State::State(State&&) noexcept = default;
-State& State::operator=(State&&) noexcept = default;
+TensorPool::TensorPool() : memory_(std::make_unique<TensorPoolMemory>()) {}
+TensorPool::~TensorPool() = default;
+TensorPool::TensorPool(TensorPool&&) noexcept = default;
+TensorPool& TensorPool::operator=(TensorPool&&) noexcept = default;
 
-Slot State::slot(uint32_t rows, uint32_t cols, DType dtype, std::string_view name, uint32_t ld)
+DeviceTensor TensorPool::tensor(uint32_t rows, uint32_t cols, DType dtype, std::string_view name, uint32_t ld)
 {
     SR_ASSERT(memory_->blocks.empty(), "'{}' is declared after the state was allocated", name);
     SR_ASSERT(rows > 0 && cols > 0 && (!ld || ld >= cols), "slot '{}' is [{}, {}] with rows {} apart", name, rows, cols,
@@ -123,14 +123,14 @@ Slot State::slot(uint32_t rows, uint32_t cols, DType dtype, std::string_view nam
     return {memory_.get(), uint32_t(memory_->items.size() - 1), shape};
 }
 
-uint64_t State::planned_bytes(const DeviceLimits& limits) const
+uint64_t TensorPool::planned_bytes(const DeviceLimits& limits) const
 {
-    std::vector<StateMemory::Item> items = memory_->items;
+    std::vector<TensorPoolMemory::Item> items = memory_->items;
     const std::vector<uint64_t> blocks = memory_->lay_out(limits, items);
     return std::accumulate(blocks.begin(), blocks.end(), uint64_t(0));
 }
 
-Status State::allocate(Device& device, const char* label)
+Status TensorPool::allocate(Device& device, const char* label)
 {
     SR_ASSERT(memory_->blocks.empty(), "the state is allocated already: {}", label);
     for (uint64_t bytes : memory_->lay_out(device.limits(), memory_->items)) {
@@ -141,7 +141,7 @@ Status State::allocate(Device& device, const char* label)
 }
 
 // here, so that graphs need not know what a slot is
-Tensor Graph::keep(Tensor made, const Slot& slot)
+Tensor Graph::keep(Tensor made, const DeviceTensor& slot)
 {
     return keep(made, slot.in(*this));
 }

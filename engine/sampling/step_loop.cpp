@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/sampling/replay.h"
+#include "engine/sampling/step_loop.h"
 
 #include <cstddef>
 
@@ -13,12 +13,12 @@ constexpr size_t kInFlight = 3; // submits ahead of the device
 } // namespace
 
 // a CPU gains nothing from rows ahead, and a run that is stopped would wait for them
-size_t Replay::ahead() const
+size_t StepLoop::ahead() const
 {
     return device_.limits().type == DeviceType::cpu || device_.profile() ? 0 : kInFlight;
 }
 
-Status Replay::begin(const ReplayMemory& memory)
+Status StepLoop::begin(const StepMemory& memory)
 {
     SR_CHECK(cancel());
     SR_CHECK(memory.x.clear(device_));
@@ -31,18 +31,18 @@ Status Replay::begin(const ReplayMemory& memory)
     return {};
 }
 
-Result<bool> Replay::step(size_t submits)
+Result<bool> StepLoop::step(size_t submits)
 {
     SR_ASSERT(active_, "a step of a run that has not begun, or has ended");
     for (; submits > 0 && row_ < rows_; --submits) {
-        SR_TRY(Program * program, row_program_(row_));
-        SR_TRY(const uint64_t ticket, program->submit());
+        SR_TRY(Executable * executable, row_executable_(row_));
+        SR_TRY(const uint64_t ticket, executable->submit());
         ++row_;
         flight_.push_back(ticket);
         if (flight_.size() > ahead()) {
             SR_CHECK(device_.wait(flight_.front()));
             flight_.pop_front();
-            SR_CHECK(program->collect_profile());
+            SR_CHECK(executable->collect_profile());
         }
     }
     if (row_ < rows_)
@@ -53,13 +53,13 @@ Result<bool> Replay::step(size_t submits)
     return true;
 }
 
-void Replay::end()
+void StepLoop::end()
 {
     SR_ASSERT(active_ && row_ == rows_, "a run is finished after {} of {} rows", row_, rows_);
     active_ = false;
 }
 
-Status Replay::cancel()
+Status StepLoop::cancel()
 {
     active_ = false;
     const uint64_t last = flight_.empty() ? 0 : flight_.back();

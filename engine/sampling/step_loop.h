@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "runtime/device/program.h"
-#include "runtime/device/state.h"
+#include "runtime/device/executable.h"
+#include "runtime/device/tensor_pool.h"
 #include "shaders/lib/step_row.h"
 
 #include <deque>
@@ -12,25 +12,28 @@
 namespace semrover {
 
 // what of a run lies on the device from row to row
-struct ReplayMemory {
-    Slot clock; // StepClock
-    Slot x, x0; // the state, and the prediction of the row before
+struct StepMemory {
+    DeviceTensor clock; // StepClock
+    DeviceTensor x, x0; // the state, and the prediction of the row before
 
-    static Slot clock_slot(State& state) { return state.slot(1, sizeof(StepClock) / 4, DType::u32, "clock", 2); }
+    static DeviceTensor clock_tensor(TensorPool& state)
+    {
+        return state.tensor(1, sizeof(StepClock) / 4, DType::u32, "clock", 2);
+    }
 };
 
 // The step loop of everything that is sampled: rows of a step table, one submit each, a few of them ahead of the
 // device. It may be stopped after any row; the next call goes on.
-class Replay {
+class StepLoop {
   public:
-    // makes ready for a row - its timestep, noise that is given - and says which program runs it, which must end with
-    // step_advance
-    using Row = std::function<Result<Program*>(size_t row)>;
+    // makes ready for a row - its timestep, noise that is given - and says which executable runs it, which must end
+    // with step_advance
+    using Row = std::function<Result<Executable*>(size_t row)>;
 
-    Replay(Device& device, size_t rows, Row row) : device_(device), rows_(rows), row_program_(std::move(row)) {}
+    StepLoop(Device& device, size_t rows, Row row) : device_(device), rows_(rows), row_executable_(std::move(row)) {}
 
     // x, x0 and the clock become zero; rows of the table before the run's are the caller's to run
-    Status begin(const ReplayMemory& memory);
+    Status begin(const StepMemory& memory);
     // submits at most that many rows; true when all are done and the device has finished them
     Result<bool> step(size_t submits);
     // ends the run where it is, after waiting for what was submitted
@@ -49,7 +52,7 @@ class Replay {
 
     size_t rows_, row_ = 0;
     bool active_ = false; // begun, and neither cancelled nor ended
-    Row row_program_;
+    Row row_executable_;
     std::deque<uint64_t> flight_; // tickets of rows that the device may still work on
 };
 

@@ -8,32 +8,33 @@
 namespace semrover {
 
 // where a copy goes that an application sees: one of its buffers or images, of the device's queue family
-struct HostTarget {
+struct ExternalTarget {
     VkBuffer buffer = VK_NULL_HANDLE;
     uint64_t offset = 0;
-    HostImage image = {};
+    ExternalImage image = {};
 };
 
-struct HostCopy {
+struct ExternalCopy {
     BufferSlice from;
-    HostTarget to;
+    ExternalTarget to;
 };
 
 // into a command buffer that is being recorded. to.image: texels of the slice's rows, as many as it has
-void record_host_target(const Device& device, VkCommandBuffer commands, const BufferSlice& from, const HostTarget& to);
+void record_external_target(const Device& device, VkCommandBuffer commands, const BufferSlice& from,
+                            const ExternalTarget& to);
 
 // Copies what lies on the device into an application's memory, and back, and waits for it.
-class HostCopies {
+class ExternalCopies {
   public:
-    static Result<std::unique_ptr<HostCopies>> create(Device& device);
+    static Result<std::unique_ptr<ExternalCopies>> create(Device& device);
 
-    Status copy(std::span<const HostCopy> copies); // as record_host_target(), in one submit
+    Status copy(std::span<const ExternalCopy> copies); // as record_external_target(), in one submit
     // as many bytes as the slice has, from a buffer with TRANSFER_SRC usage
     Status fetch(VkBuffer from, uint64_t offset, const BufferSlice& to);
-    Status fetch(const HostImage& from, const BufferSlice& to); // pixels, row by row
+    Status fetch(const ExternalImage& from, const BufferSlice& to); // pixels, row by row
 
   private:
-    explicit HostCopies(Device& device) : device_(device) {}
+    explicit ExternalCopies(Device& device) : device_(device) {}
     Status submit();
 
     Device& device_;

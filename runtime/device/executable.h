@@ -15,17 +15,17 @@ namespace semrover {
 // times, each run one submit, or several short ones where the device has a watchdog. The first run is measured then,
 // and the second waits for it once and cuts submits by what passes really took. One with alternatives to try
 // measures some more (Autotuner).
-class Program {
+class Executable {
   public:
-    static Result<std::unique_ptr<Program>> create(Device& device, const Graph& graph);
-    static Result<std::unique_ptr<Program>> create(Device& device, Plan plan);
-    ~Program();
-    Program(const Program&) = delete;
-    Program& operator=(const Program&) = delete;
+    static Result<std::unique_ptr<Executable>> create(Device& device, const Graph& graph);
+    static Result<std::unique_ptr<Executable>> create(Device& device, Plan plan);
+    ~Executable();
+    Executable(const Executable&) = delete;
+    Executable& operator=(const Executable&) = delete;
 
     Status run();              // submits and waits
     Result<uint64_t> submit(); // ticket for Device::wait
-    // into a command buffer that is being recorded, which stays good as long as the program: executions must not
+    // into a command buffer that is being recorded, which stays good as long as the executable: executions must not
     // overlap
     void record_into(VkCommandBuffer commands) const;
     Status collect_profile(); // after a wait, when the device has a profile
@@ -34,7 +34,7 @@ class Program {
     double host_us() const { return runs_ ? host_us_ / double(runs_) : 0; } // host time of one submit, mean
 
   private:
-    Program(Device& device, Plan plan) : device_(device), plan_(std::move(plan)) {}
+    Executable(Device& device, Plan plan) : device_(device), plan_(std::move(plan)) {}
     Status choose_alternatives();
     Status allocate();
     Status get_pipelines();

@@ -7,6 +7,6 @@
 namespace semrover {
 
 // every kernel that was built, by name; the list is written by cmake/shaders.cmake from the files in shaders/
-std::span<const Kernel* const> kernel_catalogue();
+std::span<const Kernel* const> kernel_registry();
 
 } // namespace semrover
