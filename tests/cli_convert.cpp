@@ -312,7 +312,7 @@ TEST(CliConvert, blocks_that_are_not_whole_are_refused)
         const auto m = RendererModel::open(folder / "out");
         return m ? std::string() : m.error().message;
     };
-    EXPECT_NE(error_with([&](TensorData& t) { return t.name != name; }).find("missing 1: " + name), std::string::npos)
+    EXPECT_NE(error_with([&](TensorData& t) { return t.name != name; }).find("1 missing: " + name), std::string::npos)
         << error_with([&](TensorData& t) { return t.name != name; });
     const auto reshaped = error_with([&](TensorData& t) {
         if (t.name == name)
