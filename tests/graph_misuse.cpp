@@ -29,7 +29,7 @@ TEST(graph_misuse, names_a_tensor_whose_type_a_shader_does_not_take)
 {
     Graph g(test_limits());
     (void)gelu(g, fake_external(g, 16, 64, DType::bf16, "activations"));
-    EXPECT_EQ(error_of(g).message, "pass 0 (gelu): binding X does not take BF16, the type of 'activations'");
+    EXPECT_EQ(error_of(g).message, "pass 0 (activation): binding X does not take BF16, the type of 'activations'");
     Graph h(test_limits());
     (void)gemm(h, fake_external(h, 16, 64), fake_external(h, 8, 64, DType::bf16, "weight"), {}, {.dtype = DType::f32});
     EXPECT_EQ(error_of(h).message, "pass 0 (gemm): binding W does not take BF16, the type of 'weight'");
