@@ -5,8 +5,8 @@
 #include "kernels/network.h"
 #include "kernels/splat.h"
 
-// Ops between pictures and networks, as those in kernels.h. Numbers are rounded to the last bit as the host rounds them
-// (shaders/lib/rounding.glsl), so that it makes no difference whether a picture went through a file.
+// Ops between pictures and networks, as those in kernels/network.h. Numbers are rounded to the last bit as the host
+// rounds them (shaders/lib/rounding.glsl), so that it makes no difference whether a picture went through a file.
 namespace semrover {
 
 // what splats look like in files: [P] u32 arrays

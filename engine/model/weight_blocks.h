@@ -6,7 +6,7 @@
 
 // Weights of 8 bits, q8_0: 32 inputs of an output, at a tap, are a block, int8 that share a scale. In a file
 // NAME.weight is I8 in its own shape, and NAME.weight_scale F16 in that shape with a 32nd of the inputs (docs/models.md
-// §1.1).
+// §2.1).
 namespace semrover {
 
 // Is this tensor stored so, in a network whose config says `"weights": "q8_0"`? Matrices and convolutions of its blocks

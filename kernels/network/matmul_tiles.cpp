@@ -17,10 +17,16 @@ struct RatedTile {
     double rate;
 };
 constexpr RatedTile kMatrixTiles[] = {
-    {{128, 160, 4, 8, 64}, 1.04}, {{128, 128, 2, 8, 64, 1, false, 32}, 1},   {{128, 80, 4, 4, 64}, 0.97},
-    {{64, 160, 2, 4, 64}, 0.93},  {{128, 64, 2, 4, 64, 1, false, 32}, 0.87}, {{64, 64, 2, 4, 64, 1, false, 32}, 0.65},
-    {{32, 32, 2, 4, 128}, 0.36}};
-constexpr RatedTile kSimtTiles[] = {{{64, 64}, 1}, {{32, 32}, 0.6}};
+    {{.rows = 128, .cols = 160, .down = 4, .subgroups = 8, .step = 64}, 1.04},
+    {{.rows = 128, .cols = 128, .subgroups = 8, .step = 64, .strip = 32}, 1},
+    {{.rows = 128, .cols = 80, .down = 4, .step = 64}, 0.97},
+    {{.rows = 64, .cols = 160, .step = 64}, 0.93},
+    {{.rows = 128, .cols = 64, .step = 64, .strip = 32}, 0.87},
+    {{.rows = 64, .cols = 64, .step = 64, .strip = 32}, 0.65},
+    {{.rows = 32, .cols = 32, .step = 128}, 0.36},
+};
+constexpr RatedTile kSimtTiles[] = {{{.rows = 64, .cols = 64}, 1}, {{.rows = 32, .cols = 32}, 0.6}};
+constexpr uint32_t kMostSums = 128;     // of a lane, or a device keeps them in memory
 constexpr size_t kMostAlternatives = 4; // that runs on a device try
 
 // Columns of K, of 128, 64 or 32, that a workgroup should have at a time: as many as leave an eighth of the steps empty
@@ -56,7 +62,6 @@ MatmulTiles lane_tiles(const DeviceLimits& limits, const MatmulShape& shape)
     return {{{tile(best), {}}}, best};
 }
 
-// constants of a tile that has `step` columns of K at a time
 std::vector<ConstantValue> constants_of(const MatmulTile& t, const DeviceLimits& limits, const MatmulShape& shape)
 {
     const bool whole = std::ranges::all_of(shape.runs, [&](uint32_t run) { return run % t.step == 0; });
@@ -81,7 +86,8 @@ std::vector<RatedTile> matrix_tiles(const KernelVariant& variant, const DeviceLi
         rated.tile.step = std::min(rated.tile.step, step_of(shape.runs));
         while (rated.tile.step > 32 && !has_room_for(variant, limits, rated.tile))
             rated.tile.step /= 2;
-        if (has_room_for(variant, limits, rated.tile))
+        const uint32_t lanes = rated.tile.subgroups * limits.matrix.subgroup;
+        if (has_room_for(variant, limits, rated.tile) && rated.tile.rows * rated.tile.cols <= kMostSums * lanes)
             tiles.push_back(rated);
     }
     return tiles;
@@ -113,10 +119,7 @@ std::vector<ConstantValue> group_constants(const DeviceLimits& limits, std::vect
 
 bool has_room_for(const KernelVariant& variant, const DeviceLimits& limits, const MatmulTile& t)
 {
-    constexpr uint32_t kMostSums = 128; // of a lane, or a GPU keeps them in memory
-    const uint32_t threads = t.subgroups * limits.matrix.subgroup;
-    return t.step % limits.matrix.k == 0 && threads <= limits.max_group_threads &&
-           (t.rows * t.cols <= kMostSums * threads || limits.type == DeviceType::cpu) &&
+    return t.step % limits.matrix.k == 0 && t.subgroups * limits.matrix.subgroup <= limits.max_group_threads &&
            shared_bytes(variant, constants_of(t, limits, {})) <= limits.max_shared_bytes;
 }
 
@@ -126,10 +129,9 @@ MatmulTiles matmul_tiles(const KernelVariant& variant, const DeviceLimits& limit
     if (variant.constant("kLanes"))
         return lane_tiles(limits, shape);
     const bool matrices = variant.features & kFeatureCooperativeMatrix;
-    std::vector<RatedTile> tiles =
-        matrices ? matrix_tiles(variant, limits, shape) : std::vector(std::begin(kSimtTiles), std::end(kSimtTiles));
-    if (wanted && matrices)
-        tiles = {{*wanted, 1}};
+    std::vector<RatedTile> tiles(std::begin(kSimtTiles), std::end(kSimtTiles));
+    if (matrices)
+        tiles = wanted ? std::vector{RatedTile{*wanted, 1}} : matrix_tiles(variant, limits, shape);
     std::ranges::stable_sort(tiles, {}, [&](const RatedTile& t) { return time_of(t, limits, shape); });
     tiles.resize(std::min(tiles.size(), kMostAlternatives));
     MatmulTiles made;

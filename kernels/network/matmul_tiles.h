@@ -40,7 +40,7 @@ struct MatmulTiles {
 // wanted: this tile and no other, of a variant for cooperative matrices on a device that has room for it
 MatmulTiles matmul_tiles(const KernelVariant& variant, const DeviceLimits& limits, const MatmulShape& shape,
                          const MatmulTile* wanted = nullptr);
-// does a device have the shared memory, threads and registers?
+// does a device have the shared memory and the threads?
 bool has_room_for(const KernelVariant& variant, const DeviceLimits& limits, const MatmulTile& tile);
 
 // lanes of a workgroup of a variant for CPUs: a subgroup, or vectors of 512 bits would be half empty

@@ -24,7 +24,7 @@ namespace semrover {
 namespace {
 
 constexpr uint64_t kStagingBytes = 16ull << 20;
-constexpr uint64_t kWaitNanoseconds = 600ull * 1000000000; // beyond any submit that the slicer makes
+constexpr uint64_t kWaitNanoseconds = 600ull * 1000000000; // longer than any submit
 
 std::string environment(const char* name)
 {

@@ -62,9 +62,9 @@ class Graph {
     const KernelVariant& variant(const Kernel& kernel, std::span<const ConstantValue> constants = {},
                                  std::span<const Tensor> tensors = {}, uint32_t excluded = 0);
 
-    // The only way to keep what a graph makes: `made`, a whole tensor of this graph, is made in memory outside it, of
-    // the same shape and row length. `made` and views of it go on being good and lie there too. What reads the memory's
-    // old contents must be in the graph before the pass that makes `made`.
+    // The only way to keep a result: `made`, a whole tensor of this graph, is written to memory outside it, of the same
+    // shape and row length. `made` and views of it stay valid and mean that memory. Passes that read the memory's old
+    // contents must be added before the one that makes `made`.
     Tensor keep(Tensor made, Tensor memory);
     Tensor keep(Tensor made, const DeviceTensor& slot);
 

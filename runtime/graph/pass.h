@@ -86,15 +86,15 @@ struct Alternative {
 struct DispatchOptions {
     const KernelVariant* variant = nullptr; // as Graph::variant() chose it; none: as it would
     std::vector<ConstantValue> constants = {};
-    // with these the op can be cut into bands of rows; needs a push member `rows`, and `first_row` where the shader
-    // must know which rows it has
+    // bindings of which a band of rows is bound where the whole does not fit; needs a push member `rows`, and
+    // `first_row` where the shader must know which rows it has
     std::vector<BandedBinding> banded = {};
-    // the constant with which a producer of binding X can do this dispatch's work in its epilogue ("kGelu")
+    // constant that turns this op on in the epilogue of the pass that makes its X ("kGelu"); empty: it is never fused
     std::string_view epilogue = {};
-    bool keeps_x = false; // absorbed: the producer goes on writing X, others may read it (statistics of X)
+    bool keeps_x = false; // when fused, the producer still writes X, which others may read (statistics of X)
     double flops = 0;     // counted
-    double max_flops = 0; // about, at most: where the data says how many
-    // ways to do it, of which the first is taken; where there are more, runs on a device find the fastest
+    double max_flops = 0; // upper bound, where the data decides
+    // tiles with the same result: the first is used until runs on the device have found the fastest
     std::vector<Alternative> alternatives = {};
 };
 
@@ -121,7 +121,7 @@ struct Pass {
     // what follows is the plan's
     std::vector<PassBinding> bindings;
     uint32_t group_count[3] = {1, 1, 1};
-    std::vector<uint32_t> epilogues; // ids of the constants of fused epilogues, and the bindings they took
+    std::vector<uint32_t> epilogues; // ids of the constants of fused epilogues, and the bindings that they use
     std::vector<size_t> epilogue_bindings;
     uint32_t level = 0;       // passes of one level run without a barrier between them
     uint32_t alternative = 0; // the one that is taken

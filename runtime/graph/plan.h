@@ -34,11 +34,11 @@ struct Plan {
     std::vector<Dispatch> dispatches;  // in order of the passes
     uint32_t levels = 0;
     uint32_t submits = 0;
-    uint32_t fused = 0; // nodes absorbed by their producers
+    uint32_t fused = 0; // passes that became epilogues of others
 
     uint64_t arena_bytes() const;
     uint64_t transient_bytes() const; // what it would be without aliasing
-    uint32_t barriers() const; // of one run: between levels, and at the end of each submit
+    uint32_t barriers() const;        // of one run: between levels, and at the end of each submit
 };
 
 class CostModel;

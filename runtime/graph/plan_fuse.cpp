@@ -24,7 +24,7 @@ bool writes(const Pass& pass, size_t binding)
     return pass.tensors[binding].valid() && uint8_t(pass.variant->bindings[binding].access) & uint8_t(Access::write);
 }
 
-// what an epilogue takes over from its producer; where its shader has none, it is never taken over
+// the input that an epilogue gets from its producer; null: its shader has none, so it cannot be fused
 const Tensor* input_of(const Pass& pass)
 {
     const std::optional<size_t> x = pass.variant->binding(shader_interface::kInput);
@@ -134,13 +134,13 @@ Status move_push(const Pass& from, Pass& to)
     return {};
 }
 
-// where the producer binds what the consumer's binding b does; X aside, which is no more
+// the producer's binding of the same name; b is not X, which a fused epilogue has in registers
 std::optional<size_t> producer_binding(const Pass& consumer, size_t b, const Pass& producer)
 {
     return producer.variant->binding(consumer.variant->bindings[b].name);
 }
 
-// does the producer bind all that the consumer does, and no other epilogue of it the same?
+// does the producer have all of the consumer's bindings, free of other epilogues?
 bool has_epilogue_bindings(const Pass& consumer, const Pass& producer)
 {
     for (size_t b = 0; b < consumer.tensors.size(); ++b) {

@@ -16,8 +16,8 @@
 // clang-format off
 // | where       | name         | meaning                                                                             |
 // |-------------|--------------|-------------------------------------------------------------------------------------|
-// | binding     | X            | input of an op that its producer may do in its epilogue                             |
-// | binding     | Y            | what a pass makes; an epilogue that it takes over writes here                       |
+// | binding     | X            | input of an op that can be fused into the epilogue of the pass that makes it        |
+// | binding     | Y            | output of a pass; a fused epilogue writes here                                      |
 // | constant    | kType<B>     | type of the elements of the tensor bound to B, a uint of lib/pack.glsl; its default |
 // |             |              | is the last type that the shader takes. A variant without it, where another has it, |
 // |             |              | takes fp16                                                                          |

@@ -2,7 +2,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // y = epilogue(x w^T), for devices that are CPUs: no shared memory, no barrier; x and w come through texel buffers,
-// the fastest loads of lavapipe (docs/lab/benchmarks.md); K unrolled by a texel; each lane owns 16 x 16 outputs, and
+// the fastest loads of lavapipe (docs/lab/benchmarks.md); K unrolled by eight columns; each lane owns 16 x 16 outputs, and
 // p.col_lanes of them lie side by side. Correct at any subgroup size.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
@@ -13,7 +13,6 @@ layout(local_size_x = 8, local_size_x_id = 33) in; // kLanes
 layout(constant_id = 33) const uint kLanes = 8; // a subgroup: 8, or 16 where vectors have 512 bits
 layout(constant_id = 2) const uint kTypeX = kF16;
 layout(constant_id = 3) const uint kTypeW = kQ8_0;
-layout(constant_id = 6) const uint kColLanes = 4; // of that tile; p.col_lanes is what runs
 layout(push_constant) uniform Push { GemmPush p; };
 layout(binding = 0) uniform usamplerBuffer X; // [groups * rows, depth]
 layout(binding = 1) uniform usamplerBuffer W; // [groups * cols, depth]

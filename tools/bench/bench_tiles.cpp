@@ -67,13 +67,6 @@ constexpr MatmulTile kTried[] = {
     {.rows = 32, .cols = 32, .step = 64, .stages = 2},
 };
 
-std::string text_of(const MatmulTile& t)
-{
-    return fmt::format("{}x{}, {} of {} subgroups down, steps of {}, {} stages{}, strips of {}, {} rows of tiles",
-                       t.rows, t.cols, t.down, t.subgroups, t.step, t.stages, t.ahead ? ", ahead" : "", t.strip,
-                       t.rows_of_tiles);
-}
-
 Json json_of(const MatmulTile& t)
 {
     return {{"rows", t.rows},           {"cols", t.cols},   {"down", t.down},
@@ -191,7 +184,7 @@ class TileBench {
         fmt::print("{}\n", line.dump());
         const std::string name =
             fmt::format("{} {}x{}x{}", shape.side ? "convolution" : "product", shape.rows, shape.cols, shape.depth);
-        rates_[name][text_of(tile)].push_back(tflops);
+        rates_[name][json_of(tile).dump()].push_back(tflops);
         return {};
     }
 
@@ -203,7 +196,8 @@ class TileBench {
             for (const auto& [tile, rates] : of_tiles)
                 means.push_back({std::accumulate(rates.begin(), rates.end(), 0.) / double(rates.size()), tile});
             std::ranges::sort(means, std::greater());
-            const auto first = std::ranges::find(means, text_of(kTried[0]), &std::pair<double, std::string>::second);
+            const auto first =
+                std::ranges::find(means, json_of(kTried[0]).dump(), &std::pair<double, std::string>::second);
             print_stderr("{}:", shape);
             for (const auto& [rate, tile] : std::span(means).first(std::min<size_t>(means.size(), 5)))
                 print_stderr("  {:8.3f} TFLOP/s, {:.2f} of the first: {}", rate,
