@@ -54,7 +54,7 @@ class Check(OnAMachine):
         return self.path("build")
 
     def test_runs_tests_as_they_are_and_in_their_variants(self):
-        code, out = self.run_tool("check", self.path("out"), "^kernel_relu")
+        code, out = self.run_tool("check", self.path("out"), "^kernel_activation")
         self.assertEqual(code, 0, out)
         for part in ("plain", "simt", "limits"):
             self.assertRegex(out, f"{part}: 1 passed, 0 failed, [0-9.]+ s\n")
@@ -77,7 +77,7 @@ class Check(OnAMachine):
         for environment, line in (({"BUILD": self.path("none")}, "no .*/none/semrover: build it here, or unpack"),
                                   ({"VK_LAYER_PATH": self.path("none")}, "no test can run with validation on"),
                                   ({"VK_ICD_FILENAMES": "none", "VK_DRIVER_FILES": "none"}, "no Vulkan device")):
-            code, out = self.run_tool("check", self.path("out"), "^kernel_relu", **environment)
+            code, out = self.run_tool("check", self.path("out"), "^kernel_activation", **environment)
             self.assertEqual(code, 1)
             self.assertRegex(out, f"check: {line}")
 
