@@ -44,6 +44,40 @@ TEST(CliVerify, a_case_passes_with_its_error_and_tolerance_on_one_line)
     EXPECT_TRUE(result.out.ends_with(" 1e-05\n")) << result.out;
 }
 
+// Of a golden case's networks in 8 bits, what a reader of their files and a double reference say: tolerances are twice
+// what was measured (docs/numerics.md §6.3)
+TEST(CliVerify, cases_stay_near_their_values_with_weights_of_8_bits)
+{
+    namespace fs = std::filesystem;
+    struct Case {
+        std::string name, part, component;
+        double tolerance;
+    };
+    for (const Case& c : {Case{"transformer_wide", "model", "voxfield_transformer", 0.008},
+                          Case{"asd_rollout_tiny", "model/unet", "renderer", 0.023}}) {
+        const ScratchFolder folder;
+        fs::copy(kGolden + "/" + c.name, folder / "case", fs::copy_options::recursive);
+        fs::create_directories(folder / "in");
+        fs::copy(folder / "case" / c.part, folder / "in" / c.component);
+        if (fs::exists(folder / "case/model/vae"))
+            fs::copy(folder / "case/model/vae", folder / "in/vae");
+        const std::string in = (folder / "in").string(), out = (folder / "out").string();
+        const ProgramResult converted = semrover_program("convert -q " + in + " " + out + " --weights q8_0");
+        ASSERT_EQ(converted.code, 0) << converted.err;
+        fs::remove_all(folder / "case" / c.part);
+        fs::copy(folder / "out" / c.component, folder / "case" / c.part);
+        Json json = *read_json(folder / "case/case.json");
+        const double before = json["tolerance"]["fp32"];
+        json["tolerance"]["fp32"] = c.tolerance;
+        folder.put("case/case.json", json.dump());
+        const ProgramResult result = semrover_program("verify " + (folder / "case").string());
+        EXPECT_EQ(result.code, 0) << result.out << result.err;
+        json["tolerance"]["fp32"] = before;
+        folder.put("case/case.json", json.dump());
+        EXPECT_EQ(semrover_program("verify " + (folder / "case").string()).code, 1) << "the weights are not in blocks";
+    }
+}
+
 TEST(CliVerify, one_case_that_fails_makes_the_exit_code_1_and_the_rest_still_runs)
 {
     const ScratchFolder folder;
