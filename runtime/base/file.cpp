@@ -17,6 +17,7 @@ namespace semrover {
 namespace {
 
 constexpr size_t kMostListed = size_t(1) << 22; // of one folder
+constexpr size_t kPieceBytes = size_t(1) << 18; // stay in a cache
 
 struct OpenFile {
     system::File file;
@@ -58,6 +59,18 @@ Result<std::span<const std::byte>> bytes_of(const MemoryEntry& entry, const Path
     return entry.bytes;
 }
 
+// the next bytes, `done` of them are read
+Result<size_t> read_some(OpenFile& open, const Path& path, std::span<std::byte> to, uint64_t done)
+{
+    const auto n = open.file.read(to);
+    if (!n)
+        return cannot_read(path, n.error());
+    if (*n == 0)
+        return fail(ErrorCode::bad_input, "cannot read {}: it was cut from {} to {} bytes while being read",
+                    quote_path(path), open.size, done);
+    return *n;
+}
+
 template <typename Buffer>
 Result<Buffer> read_whole(const Path& path, uint64_t max_bytes)
 {
@@ -75,13 +88,8 @@ Result<Buffer> read_whole(const Path& path, uint64_t max_bytes)
     buffer.resize(open.size);
     const auto all = std::as_writable_bytes(std::span(buffer));
     for (uint64_t done = 0; done < open.size;) {
-        const auto n = open.file.read(all.subspan(done));
-        if (!n)
-            return cannot_read(path, n.error());
-        if (*n == 0)
-            return fail(ErrorCode::bad_input, "cannot read {}: it was cut from {} to {} bytes while being read",
-                        quote_path(path), open.size, done);
-        done += *n;
+        SR_TRY(const size_t n, read_some(open, path, all.subspan(done), done));
+        done += n;
     }
     return buffer;
 }
@@ -176,6 +184,27 @@ Status make_folder(const Path& path)
     std::filesystem::create_directories(path, error);
     if (error)
         return fail(ErrorCode::bad_input, "cannot create {}: {}", quote_path(path), error.message());
+    return {};
+}
+
+Status read_in_pieces(const Path& path, const std::function<void(uint64_t)>& begin,
+                      const std::function<void(std::span<const std::byte>)>& piece)
+{
+    if (const auto entry = find_in_memory(path)) {
+        SR_TRY(const std::span<const std::byte> bytes, bytes_of(*entry, path));
+        begin(bytes.size());
+        piece(bytes);
+        return {};
+    }
+    SR_TRY(OpenFile open, open_regular(path));
+    begin(open.size);
+    std::vector<std::byte> buffer(std::min<uint64_t>(open.size, kPieceBytes));
+    for (uint64_t done = 0; done < open.size;) {
+        const auto room = std::span(buffer).first(std::min<uint64_t>(open.size - done, buffer.size()));
+        SR_TRY(const size_t n, read_some(open, path, room, done));
+        piece(room.first(n));
+        done += n;
+    }
     return {};
 }
 

@@ -27,6 +27,16 @@ void Hash::add(std::span<const std::byte> bytes)
         XXH64_update(state_->xxh, bytes.data(), bytes.size());
 }
 
+Status Hash::add_file(const Path& path)
+{
+    return read_in_pieces(
+        path, [&](uint64_t size) { XXH64_update(state_->xxh, &size, sizeof size); },
+        [&](std::span<const std::byte> bytes) {
+            if (!bytes.empty())
+                XXH64_update(state_->xxh, bytes.data(), bytes.size());
+        });
+}
+
 uint64_t Hash::value() const
 {
     return XXH64_digest(state_->xxh);
@@ -34,9 +44,8 @@ uint64_t Hash::value() const
 
 Result<uint64_t> hash_file(const Path& path)
 {
-    SR_TRY(const MappedFile file, MappedFile::open(path));
     Hash hash;
-    hash.add(file.bytes());
+    SR_CHECK(hash.add_file(path));
     return hash.value();
 }
 
@@ -45,9 +54,8 @@ Result<uint64_t> hash_folder(const Path& folder)
     SR_TRY(const std::vector<Path> files, list_files(folder));
     Hash hash;
     for (const Path& path : files) {
-        SR_TRY(const MappedFile file, MappedFile::open(path));
         hash.add(path.filename().string());
-        hash.add(file.bytes());
+        SR_CHECK(hash.add_file(path));
     }
     return hash.value();
 }

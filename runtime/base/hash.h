@@ -24,6 +24,7 @@ class Hash {
     // hashes the length, too, so that ("ab", "c") and ("a", "bc") differ
     void add(std::span<const std::byte> bytes);
     void add(std::string_view text) { add(std::as_bytes(std::span(text.data(), text.size()))); }
+    Status add_file(const Path& path); // its bytes, as add() would
     uint64_t value() const;
 
   private:
