@@ -21,13 +21,13 @@ constexpr uint32_t kProductsOfALoad[] = {4, 8, 16, 32};
 
 constexpr uint64_t kSmallBytes = 64 << 10, kMediumBytes = 4 << 20; // in a unit's own cache, in that of all units
 constexpr uint64_t kReadBytes[] = {64 << 10, 1 << 20, 4 << 20, 16 << 20, 32 << 20, 64 << 20, 256 << 20};
-constexpr double kFlopsOfARun = 1e12, kBytesOfARun = 4e9; // about a millisecond
+constexpr double kFlopsOfARun = 4e12, kBytesOfARun = 4e9; // some milliseconds
+constexpr uint32_t kGroupsOfAUnit = 48;                   // several rounds, however many a unit has at once
 constexpr uint32_t kRowBytes = 8192;                      // of the tensor that is read
 
 // a dispatch, and what is printed of it
 struct Control {
     Json line;
-    uint32_t groups;
     FactorRatePush push;
     DispatchOptions options = {}; // flops of products
     double bytes = 0;             // that are loaded
@@ -43,7 +43,7 @@ class FactorRates {
         for (const uint64_t bytes : kReadBytes)
             most = std::max(most, divided(bytes));
         x_ = inputs_.add(uint32_t(most / kRowBytes), kRowBytes / 2, DType::f16);
-        y_ = inputs_.add(16 * device_.limits().compute_units, 256, DType::f32);
+        y_ = inputs_.add(4 * group_count(), 256, DType::f32);
         return inputs_.allocate();
     }
 
@@ -51,10 +51,9 @@ class FactorRates {
     Control products(FactorSource source, uint64_t bytes, uint32_t products_of_a_load) const
     {
         const MatrixShape& m = device_.limits().matrix;
-        const uint32_t group_count = groups_of(4), subgroups = 4 * group_count;
-        const double of_round = 2. * m.m * m.n * m.k * std::max(products_of_a_load, 16u) * subgroups;
+        const double of_round = 2. * m.m * m.n * m.k * std::max(products_of_a_load, 16u) * 4 * group_count();
         const uint32_t rounds = rounds_of(kFlopsOfARun / of_round);
-        Control c{{{"control", "products"}, {"from", kSourceNames[source]}}, group_count, {rounds, units_of(bytes)}};
+        Control c{{{"control", "products"}, {"from", kSourceNames[source]}}, {rounds, units_of(bytes)}};
         c.options.variant = &Graph(device_.limits()).variant(kernel::factor_rate);
         c.options.constants =
             group_constants(device_.limits(), {{"kSource", source}, {"kProducts", products_of_a_load}});
@@ -71,10 +70,9 @@ class FactorRates {
 
     Control reads(uint64_t bytes) const
     {
-        const uint32_t group_count = groups_of(16);
-        const double of_round = 128. * 8 * 16 * group_count;
+        const double of_round = 128. * 8 * 16 * group_count();
         const uint32_t rounds = rounds_of(kBytesOfARun / of_round);
-        Control c{{{"control", "reads"}, {"bytes", divided(bytes)}}, group_count, {rounds, units_of(bytes)}};
+        Control c{{{"control", "reads"}, {"bytes", divided(bytes)}}, {rounds, units_of(bytes)}};
         c.options.variant = &Graph(device_.limits()).variant(kernel::factor_rate, {}, {}, kFeatureCooperativeMatrix);
         c.bytes = of_round * rounds;
         return c;
@@ -113,9 +111,9 @@ class FactorRates {
         return std::bit_floor(std::clamp<uint64_t>(bytes / divisor_, kRowBytes, most));
     }
     uint32_t units_of(uint64_t bytes) const { return uint32_t(divided(bytes) / 16); }
-    uint32_t groups_of(uint32_t a_unit) const
+    uint32_t group_count() const // of four subgroups
     {
-        return std::max(a_unit * device_.limits().compute_units / divisor_, 1u);
+        return std::max(kGroupsOfAUnit * device_.limits().compute_units / divisor_, 1u);
     }
     uint32_t rounds_of(double rounds) const
     {
@@ -125,7 +123,7 @@ class FactorRates {
     Tensor add(Graph& g, const Control& c) const
     {
         const Tensor y = g.matrix(y_.rows(), y_.cols(), DType::f32);
-        g.dispatch(kernel::factor_rate, {{"X", x_.in(g)}, {"Y", y}}, c.push, groups(c.groups), c.options);
+        g.dispatch(kernel::factor_rate, {{"X", x_.in(g)}, {"Y", y}}, c.push, groups(group_count()), c.options);
         return y;
     }
 
