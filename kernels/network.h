@@ -153,6 +153,7 @@ struct ConvOptions {
         uint32_t padding_y = 0, padding_x = 0; // on both sides
     } taps = {};                               // any rectangle instead of `kernel` and its padding
     const MatmulTile* tile = nullptr;          // in place of those that suit: for experiments
+    uint32_t slices = 0; // of K, of a variant that has them, in place of as many as suit: for experiments
 };
 [[nodiscard]] FeatureMap
 conv2d(Graph& g, FeatureMap x,

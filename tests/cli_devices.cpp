@@ -56,6 +56,15 @@ TEST(CliDevices, every_device_is_listed_with_limits_and_kernels)
     }
 }
 
+TEST(CliDevices, tiles_of_matrix_units_are_refused_where_there_are_none)
+{
+    setenv("SEMROVER_LIMITS", "coopmat=0", 1);
+    const ProgramResult refused = semrover_program("bench tiles --divide 256 --seconds 0");
+    unsetenv("SEMROVER_LIMITS");
+    EXPECT_EQ(refused.out, "");
+    expect_error(refused, 4, "tiles are of matrix units (VK_KHR_cooperative_matrix), which it has not");
+}
+
 TEST(CliDevices, limits_that_a_test_lowers_are_the_ones_shown)
 {
     setenv("SEMROVER_LIMITS", "shared=16384,variant=simt", 1);

@@ -141,7 +141,9 @@ FeatureMap conv2d(Graph& g, FeatureMap x, FeatureMap x2, Tensor w, Tensor bias, 
     dispatch.flops = 2.0 * x.batch * y.pixels() * w.rows * taps.height * taps.width *
                      (x.channels() + (x2.valid() ? x2.channels() : 0));
     dispatch.variant = &g.variant(kernel::conv2d, {}, std::vector{x.data, w});
-    const uint32_t slices = slices_of(*dispatch.variant, y, depth);
+    SR_ASSERT(!options.slices || dispatch.variant->constant("kSlices"), "conv2d: {} has no slices of K",
+              dispatch.variant->name);
+    const uint32_t slices = options.slices ? options.slices : slices_of(*dispatch.variant, y, depth);
     const bool sliced = slices > 1;
     const Tensor out = sliced ? g.matrix(y.data.rows, slices * y.data.ld, DType::f32, "slices") : y.data;
     push.y_ld = out.ld;

@@ -25,6 +25,8 @@ struct MatmulTile {
     bool ahead = false;               // factors are loaded before those in front of them are multiplied
     uint32_t strip = 16;              // columns that a subgroup finishes at once
     uint32_t rows_of_tiles = 1;       // that workgroups go through together
+
+    bool operator==(const MatmulTile&) const = default;
 };
 
 // what a workgroup of a variant makes that has one tile only

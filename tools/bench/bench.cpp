@@ -4,24 +4,27 @@
 #include "tools/bench/bench.h"
 
 #include "engine/model/unet_config.h"
+#include "runtime/device/pipeline.h"
 #include "runtime/device/profile.h"
+#include "runtime/graph/variant.h"
 #include "tools/bench/call_times.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/value_options.h"
 
 #include <algorithm>
 #include <CLI/CLI.hpp>
+#include <thread>
 
 namespace semrover {
 
-Result<Timing> measure(const std::function<Status()>& work)
+Result<Timing> measure(const std::function<Status()>& work, double ms)
 {
     const CallTimer warm_up;
-    for (int run = 0; run < 10 && (run == 0 || warm_up.ms() < 1000); ++run) // a GPU's first runs try tiles
+    for (int run = 0; run < 10 && (run == 0 || warm_up.ms() < ms); ++run) // a GPU's first runs try tiles
         SR_CHECK(work());
     const CallTimer all;
     std::vector<double> times;
-    while ((times.size() < 5 || all.ms() < 1000) && all.ms() < 30000) {
+    while ((times.size() < 5 || all.ms() < ms) && all.ms() < 30000) {
         const CallTimer one;
         SR_CHECK(work());
         times.push_back(one.ms());
@@ -83,6 +86,33 @@ void add_network(Json& report, const Executable& executable, const Timing& timin
     add_executable(report, executable);
 }
 
+Status add_code(Json& report, Device& device, const Executable& executable)
+{
+    const Pass& pass = executable.plan().passes.front();
+    std::vector<ConstantValue> constants;
+    for (const ConstantInfo& c : pass.variant->constants)
+        if (const auto given = pass.constants.find(c.id); given != pass.constants.end())
+            constants.push_back({c.name, given->second});
+    report["shared_bytes"] = shared_bytes(*pass.variant, constants);
+    SR_TRY(const auto pipelines, device.pipelines().get({&pass, 1}));
+    if (const auto& statistics = pipelines.front()->statistics)
+        for (const Statistic& s : *statistics)
+            report["statistics"][s.name] = s.value;
+    return {};
+}
+
+Status compile_pipelines(Device& device, const Graph& graph)
+{
+    SR_TRY(const Plan plan, make_plan(graph, device.costs()));
+    SR_CHECK(device.pipelines().get(plan.passes));
+    return {};
+}
+
+size_t compiled_at_once()
+{
+    return std::max(std::thread::hardware_concurrency(), 1u);
+}
+
 void add_profile(CLI::App& command, std::string& path)
 {
     command.add_option(
@@ -134,6 +164,12 @@ void print_report(const Json& report, const Globals& globals)
     }
     for (const auto& [name, value] : report.items())
         fmt::print("{:18} {}\n", name, value.is_string() ? value.get<std::string>() : value.dump());
+}
+
+void print_line(const Json& object)
+{
+    fmt::print("{}\n", object.dump());
+    std::fflush(stdout);
 }
 
 DeviceTensor BenchInputs::add(uint32_t rows, uint32_t cols, DType dtype)

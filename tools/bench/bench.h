@@ -24,8 +24,8 @@ struct Timing {
 
 Timing timing_of(std::vector<double> times); // milliseconds; none: zeros
 
-// runs `work` ten times or for a second to warm up, then until 5 runs and a second have passed, or 30 s
-Result<Timing> measure(const std::function<Status()>& work);
+// runs `work` ten times or for so many milliseconds to warm up, then until 5 runs and that time have passed, or 30 s
+Result<Timing> measure(const std::function<Status()>& work, double ms = 1000);
 
 // the fields that every benchmark's JSON has
 Json bench_report(const char* kind, const Device& device, DType precision, const Timing& timing,
@@ -50,6 +50,14 @@ Status read_config(const std::string& path, Parse parse, Config& config)
     return {};
 }
 
+// of an executable's first pass: shared_bytes of a workgroup and, where the device keeps it, what its driver says of
+// the code, under the driver's own names: statistics
+Status add_code(Json& report, Device& device, const Executable& executable);
+
+// The pipelines of a graph are compiled side by side, for executables that follow; of so many it has use at once.
+Status compile_pipelines(Device& device, const Graph& graph);
+size_t compiled_at_once();
+
 // --weights: q8_0, or in the precision
 void add_weights(CLI::App& command, std::string& weights);
 // a UNet's config with such weights, where they are given. bad_input: one that cannot have them
@@ -61,6 +69,7 @@ void add_plan(CLI::App& command, bool& plan);
 void restart_profile(Device& device, const std::string& path); // without what ran before, such as loading weights
 Status write_profile(Device& device, const std::string& path);
 void print_report(const Json& report, const Globals& globals);
+void print_line(const Json& object); // at once: what is printed stays when a long run is cut off
 
 // memory with seeded values on a device, for inputs of kernels
 class BenchInputs {

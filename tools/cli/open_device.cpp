@@ -11,7 +11,7 @@
 
 namespace semrover {
 
-Result<std::shared_ptr<Device>> open_device(const Globals& globals, const std::string& profile)
+Result<std::shared_ptr<Device>> open_device(const Globals& globals, const std::string& profile, bool statistics)
 {
     if (globals.session && globals.session->device)
         return globals.session->device;
@@ -22,7 +22,7 @@ Result<std::shared_ptr<Device>> open_device(const Globals& globals, const std::s
     options.max_bytes = globals.max_vram;
     options.autotune = globals.autotune;
     options.cancelled = interrupt_requested;
-    options.pipeline_statistics = !profile.empty();
+    options.pipeline_statistics = statistics || !profile.empty();
     SR_TRY(std::shared_ptr<Device> device, Device::create(options));
     if (globals.session)
         globals.session->device = device;

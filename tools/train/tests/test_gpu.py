@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """tools/gpu on whatever device is here, with little to do: so that nothing is wrong on the day when a GPU is at hand."""
+import json
 import os
 import stat
 import subprocess
@@ -80,6 +81,27 @@ class Check(OnAMachine):
             code, out = self.run_tool("check", self.path("out"), "^kernel_activation", **environment)
             self.assertEqual(code, 1)
             self.assertRegex(out, f"check: {line}")
+
+
+class Tiles(OnAMachine):
+    def test_makes_profiles_and_says_that_a_device_has_no_matrix_units(self):
+        code, out = self.run_tool("tiles", self.path("out"), DIVIDE="64")
+        self.assertEqual(code, 1, out)
+        for network in ("unet", "vae", "transformer"):
+            self.assertRegex(out, f'{network}: "ms_median":[0-9.e+-]+ "gflops":[0-9.e+-]+\n')
+            self.assertGreater(os.path.getsize(self.path("out", f"{network}.trace.json.gz")), 0)
+        with open(self.path("out", "networks.jsonl")) as file:
+            self.assertEqual([json.loads(line)["kind"] for line in file], ["unet", "vae", "transformer"])
+        self.assertRegex(out, r"\n[^\n]*: tiles are of matrix units \(VK_KHR_cooperative_matrix\), which it has not\n"
+                              "tiles with other bits: 0\nfailed 1\n$")
+        self.assertEqual(os.path.getsize(self.path("out", "tiles.jsonl")), 0)
+        self.assertLessEqual(len(os.listdir(self.path("out"))), 7)  # the eighth would be NVIDIA's clocks.csv
+        with open(self.path("out", "summary.txt")) as file:
+            self.assertEqual(file.read(), out)
+
+    def test_names_networks_that_had_no_time(self):
+        _, out = self.run_tool("tiles", self.path("out"), DIVIDE="64", MINUTES="0")
+        self.assertIn("unet: no time was left\nvae: no time was left\ntransformer: no time was left\n", out)
 
 
 class Train(OnAMachine):
