@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // needs: programs
+#include "runtime/base/json.h"
 #include "runtime/base/safetensors.h"
 #include "tests/support/json_text.h"
 #include "tests/support/program.h"
