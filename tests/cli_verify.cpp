@@ -45,8 +45,8 @@ TEST(CliVerify, a_case_passes_with_its_error_and_tolerance_on_one_line)
     EXPECT_TRUE(result.out.ends_with(" 1e-05\n")) << result.out;
 }
 
-// Of a golden case's networks in 8 bits, what a reader of their files and a double reference say: tolerances are twice
-// what was measured (docs/numerics.md §6.3)
+// Golden cases, expected values as they are, networks as `convert` puts them in blocks. Tolerances are twice what was
+// measured (docs/numerics.md §6.3), and above those of the case: without blocks it passes those, with blocks not
 TEST(CliVerify, cases_stay_near_their_values_with_weights_of_8_bits)
 {
     namespace fs = std::filesystem;

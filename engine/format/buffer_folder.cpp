@@ -215,8 +215,7 @@ Result<uint64_t> hash_pictures(const BufferCamera& camera, std::initializer_list
     for (uint32_t i = first; i <= last; ++i)
         for (const char* kind : kinds) {
             SR_TRY(const Path path, find_picture(camera.folder, kind, i));
-            SR_TRY(const MappedFile file, MappedFile::open(path));
-            hash.add(file.bytes());
+            SR_CHECK(hash.add_file(path));
         }
     return hash.value();
 }
