@@ -228,7 +228,8 @@ static void shares_a_queue(void)
         CHECK(pthread_join(threads[i], NULL) == 0);
         check_same(&visitors[i]);
     }
-    printf("one queue: %u submits of the application's, %u locks by both contexts\n", submits, queue.locks - submits - 2);
+    printf("one queue: %u submits of the application's, %u locks by both contexts\n", submits,
+           queue.locks - submits - 2);
     CHECK(queue.users == 0 && queue.locks > submits + 2);
     CHECK(pthread_mutex_destroy(&queue.mutex) == 0);
     destroy_host(&queue.host);
@@ -442,8 +443,18 @@ static splat* splats_of(animation* self, sr_world* world, size_t* count)
     return out;
 }
 
-/* The splats of a world that one thread makes and shows at once. Pictures may differ a little: where splats are equally
- * far, the order of tiles in memory counts */
+/* Where splats are equally far, the order of tiles in memory counts, and that goes by which thread came first: a pixel
+ * in a hundred may show the other splat */
+static void check_nearly_same_labels(const uint32_t* label)
+{
+    int i, other = 0;
+    for (i = 0; i < PIXELS; ++i)
+        other += memcmp(label + 2 * i, alone.label + 2 * i, 2 * sizeof *label) != 0;
+    printf("a worker: %d of %d pixels show another splat\n", other, PIXELS);
+    CHECK(other <= PIXELS / 100);
+}
+
+/* The splats of a world that one thread makes and shows at once, to the bit */
 static void check_same_splats(animation* self)
 {
     visitor other = *self->visitor;
@@ -494,7 +505,7 @@ static void draws_while_a_worker_steps(void)
     animate(&a, ++number);
     wait_value(&a.queue.host, a.timeline, number);
     last = (int)(number % FRAMES_ON_THEIR_WAY);
-    CHECK(!memcmp(a.label[last].mapped, alone.label, sizeof alone.label));
+    check_nearly_same_labels(a.label[last].mapped);
     check_same_splats(&a);
     printf("a worker: %u frames beside it\n", (unsigned)number);
     close_animation(&a);

@@ -30,6 +30,7 @@ const FlashCase kCases[] = {
     {150, 200, 1, 40}, // blocks of 64 keys, the last one short
     {70, 100, 1, 64, 2},
     {40, 90, 2, 160},
+    {300, 200, 2, 40}, // many queries a lane of a CPU
 };
 
 constexpr uint32_t padded(uint32_t rows)

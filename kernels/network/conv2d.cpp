@@ -147,8 +147,9 @@ FeatureMap conv2d(Graph& g, FeatureMap x, FeatureMap x2, Tensor w, Tensor bias, 
     const bool sliced = slices > 1;
     const Tensor out = sliced ? g.matrix(y.data.rows, slices * y.data.ld, DType::f32, "slices") : y.data;
     push.y_ld = out.ld;
-    MatmulTiles made = matmul_tiles(*dispatch.variant, g.limits(),
-                                    {push.rows, push.cols, slices, {push.x_cols, push.x2_cols}}, options.tile);
+    MatmulTiles made = matmul_tiles(
+        *dispatch.variant, g.limits(),
+        {push.rows, push.cols, slices, {push.x_cols, push.x2_cols}, is_little(dispatch.flops)}, options.tile);
     push.col_lanes = made.col_lanes;
     dispatch.alternatives = std::move(made.alternatives);
     dispatch.constants = group_constants(g.limits(), {{"kKernelHeight", taps.height},

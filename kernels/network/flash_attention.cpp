@@ -15,7 +15,6 @@ namespace semrover {
 namespace {
 
 constexpr uint32_t kMostFlashMatrixDim = 160; // flash_attention.coopmat keeps queries and sums in registers
-constexpr uint32_t kLaneQueries = 16;         // of flash_attention.cpu
 
 void check(const Tensor& q, const Tensor& kv, const FlashAttentionOptions& o)
 {
@@ -54,12 +53,14 @@ Tensor flash_attention(Graph& g, Tensor q, Tensor kv, const FlashAttentionOption
     push.chunks = chunks;
     push.scale = float(std::numbers::log2e * (o.scale > 0 ? o.scale : 1 / std::sqrt(double(o.head_dim))));
     DispatchOptions dispatch;
-    dispatch.constants = group_constants(g.limits(), {{"kChunks", chunks}, {"kMostChunks", chunks <= 20 ? 20u : 64u}});
     dispatch.flops = 4.0 * o.batch * o.query_rows * o.keys * o.heads * o.head_dim;
+    const uint32_t lane_queries = is_little(dispatch.flops) ? 4 : 16;
+    dispatch.constants = group_constants(
+        g.limits(), {{"kChunks", chunks}, {"kMostChunks", chunks <= 20 ? 20u : 64u}, {"kQueries", lane_queries}});
     const uint32_t excluded = o.head_dim > kMostFlashMatrixDim ? kFeatureCooperativeMatrix : 0u;
     dispatch.variant = &g.variant(kernel::flash_attention, dispatch.constants, std::vector{q, kv}, excluded);
     const bool on_lanes = dispatch.variant->constant("kLanes");
-    const Tile tile = on_lanes ? Tile{kLaneQueries * cpu_lanes(g.limits()), 1} : fixed_tile(*dispatch.variant);
+    const Tile tile = on_lanes ? Tile{lane_queries * cpu_lanes(g.limits()), 1} : fixed_tile(*dispatch.variant);
     if (o.batch == 1)
         dispatch.banded = {"Q", "Y"};
     g.dispatch(kernel::flash_attention, {{"Q", q}, {"Kv", kv}, {"Y", y}}, push,

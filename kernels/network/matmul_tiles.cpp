@@ -49,9 +49,9 @@ uint32_t step_of(const std::vector<uint32_t>& runs)
 // beyond the last row and column.
 MatmulTiles lane_tiles(const DeviceLimits& limits, const MatmulShape& shape)
 {
-    constexpr uint32_t kLaneRows = 16, kLaneCols = 16;
-    const uint32_t all = cpu_lanes(limits);
-    const auto tile = [&](uint32_t across) { return Tile{kLaneRows * (all / across), kLaneCols * across}; };
+    constexpr uint32_t kLaneRows = 16;
+    const uint32_t all = cpu_lanes(limits), lane_cols = shape.narrow ? 8 : 16;
+    const auto tile = [&](uint32_t across) { return Tile{kLaneRows * (all / across), lane_cols * across}; };
     const auto outputs = [&](uint32_t across) {
         return uint64_t(round_up(shape.rows, tile(across).rows)) * round_up(shape.cols, tile(across).cols);
     };
@@ -59,7 +59,7 @@ MatmulTiles lane_tiles(const DeviceLimits& limits, const MatmulShape& shape)
     for (uint32_t across = all; across >= 1; across /= 2)
         if (outputs(across) < outputs(best))
             best = across;
-    return {{{tile(best), {}}}, best};
+    return {{{tile(best), {{"kLaneCols", lane_cols}}}}, best};
 }
 
 std::vector<ConstantValue> constants_of(const MatmulTile& t, const DeviceLimits& limits, const MatmulShape& shape)
@@ -103,6 +103,11 @@ double time_of(const RatedTile& rated, const DeviceLimits& limits, const MatmulS
 }
 
 } // namespace
+
+bool is_little(double flops)
+{
+    return flops <= 1 << 23;
+}
 
 uint32_t cpu_lanes(const DeviceLimits& limits)
 {

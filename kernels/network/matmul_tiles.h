@@ -13,6 +13,7 @@ struct MatmulShape {
     uint32_t rows = 0, cols = 0; // of the output of a group
     uint32_t groups = 1;         // workgroups in z
     std::vector<uint32_t> runs;  // columns of K that follow each other; each run begins a step of its own
+    bool narrow = false;         // a lane of a CPU makes 8 columns, not 16: less code, and no GEGLU
 };
 
 // A tile, and how a workgroup makes it with cooperative matrices (shaders/lib/gemm_tile.coopmat.glsl). All give the
@@ -44,6 +45,9 @@ MatmulTiles matmul_tiles(const KernelVariant& variant, const DeviceLimits& limit
                          const MatmulTile* wanted = nullptr);
 // does a device have the shared memory and the threads?
 bool has_room_for(const KernelVariant& variant, const DeviceLimits& limits, const MatmulTile& tile);
+
+// Are operations so few that code unrolled less far is better? They end sooner than a driver has read the rest of it.
+bool is_little(double flops);
 
 // lanes of a workgroup of a variant for CPUs: a subgroup, or vectors of 512 bits would be half empty
 uint32_t cpu_lanes(const DeviceLimits& limits);

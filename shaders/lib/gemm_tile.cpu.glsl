@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
-// the 16 x 16 outputs of a lane, their products over eight columns of K, and what becomes of them
+// the outputs of a lane, their products over eight columns of K, and what becomes of them
+layout(constant_id = 34) const uint kLaneCols = 16; // 8 or 16; 16 for GEGLU
 const uint kRows = 16;
-const uint kCols = 16;
+const uint kCols = kLaneCols;
 
 float acc[kRows][kCols];
 

@@ -1,9 +1,9 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// y[n] = epilogue(sum over taps and channels of w[n, tap, c] x[pixel at tap, c]), an implicit GEMM with the same tiles as
-// gemm.cpu.comp: 16 pixels x 16 channels a lane, p.col_lanes side by side, texel loads, no shared memory. Taps outside the
-// image load zeros.
+// y[n] = epilogue(sum over taps and channels of w[n, tap, c] x[pixel at tap, c]), an implicit GEMM with the tiles of
+// gemm.cpu.comp: 16 pixels x 16 or 8 channels a lane, p.col_lanes side by side, texel loads, no shared memory. Taps
+// outside the image load zeros.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #include "conv2d.h"

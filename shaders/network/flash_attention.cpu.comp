@@ -1,7 +1,7 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// y = softmax(q k^T scale) v, online over blocks of 32 keys; for devices that are CPUs: every lane owns 16 queries, so
+// y = softmax(q k^T scale) v, online over blocks of 32 keys; for devices that are CPUs: every lane owns queries, so
 // that nothing is exchanged; loads come through texel buffers; eight channels of a block are unrolled.
 // note: the sums of y are indexed by a loop and therefore live in memory, where lavapipe moves them lane by lane: 32
 // keys pay for one such move. With 16 it reaches 0.7 of the speed; unrolling the channels takes minutes to compile.
@@ -21,7 +21,7 @@ layout(binding = 0) uniform usamplerBuffer Q;          // [batch * query_rows, q
 layout(binding = 1) uniform usamplerBuffer Kv;         // [batch * key_rows, kv_ld]
 layout(binding = 2) writeonly buffer Y { uvec4 y[]; }; // [batch * query_rows, y_ld]
 
-const uint kQueries = 16;
+layout(constant_id = 34) const uint kQueries = 16; // of a lane
 const uint kKeys = 32;
 
 float s[kQueries][kKeys]; // scores of a block, then their exponentials

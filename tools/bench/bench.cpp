@@ -174,27 +174,27 @@ void print_line(const Json& object)
 
 DeviceTensor BenchInputs::add(uint32_t rows, uint32_t cols, DType dtype)
 {
-    return slots_.emplace_back(state_.tensor(rows, cols, dtype, "input", dtype == DType::u32 ? cols : 0));
+    return inputs_.emplace_back(pool_.tensor(rows, cols, dtype, "input", dtype == DType::u32 ? cols : 0));
 }
 
 Status BenchInputs::allocate()
 {
-    SR_CHECK(state_.allocate(device_, "benchmark inputs"));
+    SR_CHECK(pool_.allocate(device_, "benchmark inputs"));
     uint32_t state = 12345;
     const auto random = [&] { return state = state * 1664525u + 1013904223u; };
-    for (const DeviceTensor& slot : slots_) {
-        std::vector<uint32_t> words(slot.bytes() / 4);
+    for (const DeviceTensor& input : inputs_) {
+        std::vector<uint32_t> words(input.bytes() / 4);
         for (uint32_t& w : words) {
             const float v = float(random() >> 8) / 8388608.f - 1;
             w = random();
-            if (slot.dtype() == DType::f32)
+            if (input.dtype() == DType::f32)
                 __builtin_memcpy(&w, &v, 4);
-            else if (slot.dtype() == DType::f16)
+            else if (input.dtype() == DType::f16)
                 w = uint32_t(float_to_half(v)) | uint32_t(float_to_half(v * 0.5f)) << 16;
-            else if (slot.dtype() == DType::q8_0)
+            else if (input.dtype() == DType::q8_0)
                 w &= 0x1f1f1f1f; // small int8, and scales that are numbers
         }
-        SR_CHECK(slot.write(device_, words));
+        SR_CHECK(input.write(device_, words));
     }
     return {};
 }

@@ -78,12 +78,12 @@ class BenchInputs {
     // normal-ish values as fp32 or fp16 matrices, small ones as q8_0, or uniform words for u32
     DeviceTensor add(uint32_t rows, uint32_t cols, DType dtype);
     Status allocate();
-    uint64_t bytes() const { return state_.planned_bytes(device_.limits()); }
+    uint64_t bytes() const { return pool_.planned_bytes(device_.limits()); }
 
   private:
     Device& device_;
-    TensorPool state_;
-    std::vector<DeviceTensor> slots_;
+    TensorPool pool_;
+    std::vector<DeviceTensor> inputs_;
 };
 
 // y [m, n] = x [m, k] w [n, k]^T

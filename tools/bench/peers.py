@@ -62,7 +62,7 @@ def patch_networks(dtype):
     image_blocks.LayerNorm.forward = nn.LayerNorm.forward
     transformer.layer_norm = lambda x: F.layer_norm(x, x.shape[-1:], eps=1e-6)
     transformer.gelu_tanh = lambda x: F.gelu(x, approximate="tanh")
-    transformer.VoxfieldTransformer.attention_mask = lambda self, centers, valid: self.peer_mask
+    transformer.VoxfieldTransformer.attention_mask = lambda self, *_: self.peer_mask
     of_unet, of_transformer = unet.UNet2DConditionModel._sinusoids, transformer.sinusoids
     unet.UNet2DConditionModel._sinusoids = lambda self, timestep: of_unet(self, timestep).to(dtype)
     transformer.sinusoids = lambda x, width: of_transformer(x, width).to(dtype)
@@ -169,7 +169,7 @@ class Peers:
         valid = torch.ones(2 * regions, cells, dtype=torch.bool, device=self.device)
         labels = (torch.arange(cells, device=self.device) % 20).repeat(2 * regions, 1)
         labels[regions:] = 20
-        mask = attention_mask(net, centers, valid).clamp_min(-6e4).to(self.dtype)
+        mask = attention_mask(centers, valid, net.config["attention_radius"]).clamp_min(-6e4).to(self.dtype)
         net.register_buffer("peer_mask", mask, persistent=False)
         timestep = torch.full((2 * regions,), 500.0, device=self.device)
         return Network(net, self.random(2 * regions, cells, 120), labels, centers, valid, timestep)
