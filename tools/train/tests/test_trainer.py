@@ -1,0 +1,329 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""What does not change a run: how its batches are divided, among how many processes, what is computed again, and when it
+was killed."""
+import contextlib
+import io
+import json
+import multiprocessing
+import os
+import random
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+import types
+import unittest
+from unittest import mock
+
+import torch
+from torch.nn import functional as F
+
+from recipe import RUN
+from semtrain import asd, processes, safetensors_file, transformer, vae, vsd
+from semtrain.draws import Draws, generator
+from semtrain.grids import Grids, LocalSets
+from semtrain.json_file import read_json
+from semtrain.nets import attention, recompute
+from semtrain.nets.transformer import VoxfieldTransformer
+from semtrain.run_folder import RunFolder
+from semtrain.trainer import Trainer
+from test_recipes_asd import ASD, VAE, draw_drive
+from test_recipes_vsd import VSD
+from test_runs import ENVIRONMENT, InAFolder
+from test_transformer import TINY, write_street
+
+FORK = multiprocessing.get_context("fork")  # no import of torch a process
+
+
+class Attention(unittest.TestCase):
+    def test_by_the_fused_kernel_is_what_it_is_written_out(self):
+        private = getattr(F, "_scaled_dot_product_attention", None)  # of PyTorch 1.13, whose public name is not there yet
+        fused = getattr(F, "scaled_dot_product_attention", None) or (lambda q, k, v, mask: private(q, k, v, mask)[0])
+        torch.manual_seed(1)
+        q, k, v = (torch.randn(2, 3, n, 16, requires_grad=True) for n in (20, 30, 30))
+        masked = torch.zeros(2, 1, 20, 30).masked_fill_(torch.rand(2, 1, 20, 30) < 0.5, -1e9)
+        for mask in (None, masked):
+            with mock.patch.object(F, "scaled_dot_product_attention", side_effect=fused, create=True) as called:
+                found = self.result(q, k, v, mask)
+                called.assert_called_once()
+            with mock.patch.object(attention, "F", types.SimpleNamespace()):
+                expected = self.result(q, k, v, mask)
+            for a, b in zip(found, expected):
+                torch.testing.assert_close(a, b, atol=2e-6, rtol=1e-5)
+
+    @staticmethod
+    def result(*arguments):
+        out = attention.attend(*arguments)
+        return [out, *torch.autograd.grad(out.square().sum(), arguments[:3])]
+
+
+class Draw(unittest.TestCase):
+    def test_gives_a_part_the_numbers_that_it_has_in_the_batch(self):
+        def drawn(part):
+            own = Draws(torch.Generator().manual_seed(3), 6, part)
+            return own.normal((5, 7)), own.uniform(), own.below(1000)
+        for whole, *parts in zip(*(drawn(part) for part in (None, range(0, 2), range(2, 6)))):
+            self.assertTrue(torch.equal(whole, torch.cat(parts)))
+
+
+class Recompute(unittest.TestCase):
+    def check(self, model, loss):
+        """its loss and gradients are the same, and each of its blocks is computed once more"""
+        def result():
+            model.zero_grad()
+            loss(model).backward()
+            return [p.grad.clone() for p in model.parameters() if p.grad is not None]
+        expected, runs = result(), []
+        for block in recompute.blocks_of(model):
+            block.register_forward_hook(lambda *_: runs.append(None))
+            block.forward = mock.Mock(side_effect=block.forward)
+        blocks = list(recompute.blocks_of(model))
+        inner = [block.forward for block in blocks]
+        recompute.recompute_blocks(model)
+        for a, b in zip(result(), expected, strict=True):
+            self.assertTrue(torch.equal(a, b))
+        self.assertTrue(blocks and all(forward.call_count == 2 for forward in inner))
+        self.assertEqual(len(runs), len(blocks))
+
+    def setUp(self):
+        torch.manual_seed(1)
+
+    def test_of_the_transformer_changes_nothing(self):
+        model, x = VoxfieldTransformer(2, 2, 16, 4, pos_embed_dim=8), torch.randn(2, 9, 24)
+        centers, valid = torch.randn(2, 9, 3).double(), torch.ones(2, 9, dtype=torch.bool)
+        self.check(model, lambda m: (m(x, torch.ones(2, 9).long(), centers, valid, torch.tensor([3, 500])) - x)
+                   .square().mean())
+
+    def test_of_the_renderers_and_the_vae_changes_nothing(self):
+        latents, shares, t = torch.randn(3, 2, 4, 6, 6), torch.rand(2, 1, 6, 6), torch.tensor([3, 500])
+        self.check(asd.Renderer(ASD), lambda m: m(*latents, shares, t).square().mean())
+        videos, shares, sigma = torch.randn(2, 2, 3, 4, 6, 6), torch.rand(2, 3, 1, 6, 6), torch.tensor([0.1, 2])
+        self.check(vsd.Renderer(VSD), lambda m: m(*videos, shares, sigma).square().mean())
+        image = torch.randn(2, 3, 16, 16)
+        self.check(vae.AutoencoderKL({**VAE, "mid_block_add_attention": True}),
+                   lambda m: (m.decode(m.moments(image)[0]) - image).square().mean())
+
+    def test_of_a_network_without_such_blocks_is_refused(self):
+        with self.assertRaisesRegex(SystemExit, "recompute: this network has no block of these: JointBlock"):
+            recompute.recompute_blocks(torch.nn.Linear(2, 2))
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+def in_process(environment, output, function, *arguments):
+    """what a process that was forked does: the function, its output to a file"""
+    os.environ.update(environment)
+    with open(output, "w", buffering=1) as file:
+        os.dup2(file.fileno(), 1)
+        os.dup2(file.fileno(), 2)
+        sys.stdout = sys.stderr = file
+        try:
+            function(*arguments)
+        except SystemExit as end:
+            if isinstance(end.code, str):
+                print(end.code)
+            os._exit(end.code if isinstance(end.code, int) else 1)
+        os._exit(0)
+
+
+class ARun(InAFolder):
+    """of a tiny transformer"""
+
+    def setUp(self):
+        super().setUp()
+        write_street(self.path("a.sgrid"))
+        write_street(self.path("held.sgrid"), seed=1)
+        torch.set_num_threads(1)
+
+    def words(self, folder, *more):
+        return ["transformer", "--config", "small", "-o", self.path(folder), "--threads", "1", "--grids",
+                self.path("a.sgrid"), *TINY, "--set", "steps=12", "--set", "known_share=0.5", *more]
+
+    def train(self, folder, *more):
+        with mock.patch.object(sys, "argv", self.words(folder, *more)):
+            transformer.main()
+
+    def trained(self, folder, *more):
+        """-> {name: tensor} of its checkpoint, and the rows of its log"""
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.train(folder, *more)
+        return self.state(folder)
+
+    def state(self, folder):
+        with open(self.path(folder, "log.jsonl")) as file:
+            return safetensors_file.read(self.path(folder, "checkpoint.safetensors")), [json.loads(x) for x in file]
+
+    def start(self, environments, folder, *more):
+        """a process for each -> [(process, file of what it prints)]"""
+        started = []
+        for i, environment in enumerate(environments):
+            output = self.path(f"output{time.monotonic_ns()}-{i}")
+            open(output, "w").close()
+            process = FORK.Process(target=in_process, args=(environment, output, self.train, folder, *more))
+            process.start()
+            started.append((process, output))
+        return started
+
+    def finish(self, started):
+        """-> [(exit code, what it printed)]"""
+        out = []
+        for process, output in started:
+            process.join(60)
+            if process.is_alive():
+                process.kill()
+            with open(output) as file:
+                out.append((process.exitcode, file.read()))
+        return out
+
+    def two(self):
+        """environments of two processes as torchrun gives them"""
+        common = {"WORLD_SIZE": "2", "MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(free_port())}
+        return [{**common, "RANK": str(i), "LOCAL_RANK": str(i)} for i in range(2)]
+
+    def two_by_srun(self):
+        common = {"SLURM_JOB_ID": str(free_port()), "SLURM_STEP_ID": "0", "SLURM_STEP_NUM_TASKS": "2",
+                  "SLURM_STEP_NODELIST": "localhost"}
+        return [{**common, "SLURM_PROCID": str(i), "SLURM_LOCALID": str(i)} for i in range(2)]
+
+    def assert_equal(self, found, expected, tolerance=0.0):
+        self.assertEqual(set(found), set(expected))
+        for name, tensor in expected.items():
+            torch.testing.assert_close(found[name], tensor, atol=tolerance, rtol=0, msg=name)
+
+    def test_accumulates_what_the_whole_batch_gives(self):
+        whole, log = self.trained("whole")
+        for parts in (2, 4):
+            found, found_log = self.trained(f"in{parts}", "--set", f"accumulate={parts}")
+            # sums in another order; Adam's first steps, which divide by the gradient, make more of that
+            self.assert_equal(found, whole, 2e-5)
+            self.assertAlmostEqual(found_log[-1]["loss"], log[-1]["loss"], 5)
+        with self.assertRaisesRegex(SystemExit, "batch 4: expected a multiple of 3, 1 processes times 3"):
+            self.trained("in3", "--set", "accumulate=3")
+
+    def test_by_two_processes_has_the_bits_of_two_parts_and_goes_on_with_one(self):
+        parts, log = self.trained("parts", "--set", "accumulate=2")
+        for by, environments in (("torchrun", self.two()), ("srun", self.two_by_srun())):
+            started = self.start(environments, by)
+            (code, out), other = self.finish(started)
+            self.assertEqual((code, other), (0, (0, "")), out)
+            found, found_log = self.state(by)
+            self.assert_equal(found, parts)
+            self.assertEqual([row["loss"] for row in found_log], [row["loss"] for row in log])
+        self.trained("resumed", "--set", "minutes=0.000001", "--set", "accumulate=2")
+        self.assertEqual([code for code, _ in self.finish(self.start(self.two(), "resumed", "--set", "minutes=0.000001"))],
+                         [0, 0])
+        found = self.trained("resumed", "--set", "accumulate=2")[0]
+        self.assert_equal(found, parts)
+        self.assertEqual([row["step"] for row in self.state("resumed")[1]], [1, 2, 12])
+
+    def test_by_two_processes_stops_at_one_step_when_one_of_them_is_told_to(self):
+        started = self.start(self.two(), "run", "--set", "steps=100000", "--set", "save_minutes=0")
+        while not os.path.exists(self.path("run", "checkpoint.safetensors")):
+            self.assertTrue(started[0][0].is_alive())
+            time.sleep(0.02)
+        os.kill(started[1][0].pid, signal.SIGTERM)
+        (code, out), other = self.finish(started)
+        self.assertEqual((code, other), (130, (130, "")), out)
+        self.assertIn("stopped at step", out)
+
+    def test_by_two_processes_is_refused_in_both_where_it_is_in_one(self):
+        self.trained("run")
+        with open(os.devnull, "w") as file, contextlib.redirect_stderr(file):
+            (code, out), other = self.finish(self.start(self.two(), "run", "--set", "learning_rate=0.1"))
+        self.assertEqual((code, other), (1, (1, "")))
+        self.assertIn("was begun with learning_rate", out)
+
+    def test_that_is_killed_at_any_moment_ends_as_one_that_was_not(self):
+        draw, kills, resumed_at = random.Random(1), int(os.environ.get("KILLS", "6")), set()
+        steps, path = ["--set", f"steps={20 * kills}", "--set", "keep=3"], self.path("killed", "checkpoint.safetensors")
+        whole, _ = self.trained("whole", *steps)
+        for kill in range(kills):
+            started = self.start([{}], "killed", *steps, "--set", "save_minutes=0")
+            for _ in range(kill % 4):  # some before the first checkpoint, some while later ones are written
+                before = os.stat(path).st_ino if os.path.exists(path) else 0
+                while (os.stat(path).st_ino if os.path.exists(path) else 0) == before:
+                    self.assertTrue(started[0][0].is_alive())
+                    time.sleep(0.002)
+            time.sleep(draw.uniform(0, 0.03 if kill % 4 else 0.3))
+            started[0][0].kill()
+            (code, out), = self.finish(started)
+            self.assertEqual(code, -signal.SIGKILL, out)
+            resumed_at.update(re.findall(r"continuing .* at step (\d+)", out))
+        self.assertEqual(self.finish(self.start([{}], "killed", *steps))[0][0], 0)
+        self.assert_equal(self.state("killed")[0], whole)
+        self.assertGreater(len(resumed_at), kills / 3)
+
+    def test_keeps_as_many_checkpoints_as_it_is_told_to(self):
+        def kept():
+            return sorted(name for name in os.listdir(self.path("run")) if name.endswith(".safetensors"))
+        place = RunFolder(self.path("run"))
+        for step in range(1, 6):
+            place.write_checkpoint({"a": torch.tensor([step])}, step, 3)
+        self.assertEqual(kept(), ["checkpoint-000000003.safetensors", "checkpoint-000000004.safetensors",
+                                  "checkpoint.safetensors"])
+        self.assertEqual(int(safetensors_file.read(self.path("run", "checkpoint-000000004.safetensors"))["a"]), 4)
+        place.write_checkpoint({"a": torch.tensor([6])}, 6, 1)
+        self.assertEqual(kept(), ["checkpoint.safetensors"])
+
+    def test_logs_the_loss_of_what_it_does_not_train_on(self):
+        for folder, steps in (("a", 1), ("b", 150)):
+            self.trained(folder, "--held-out", self.path("held.sgrid"), "--set", f"steps={steps}", "--set", "ema=0.9",
+                         "--set", "learning_rate=0.003")
+        first, last = (self.state(folder)[1][-1] for folder in "ab")
+        self.assertEqual((set(first), last["step"]), ({"step", "held_out"}, 150))
+        self.assertLess(last["held_out"], 0.7 * first["held_out"])
+        # with the averaged weights, which the training goes on without
+        config = read_json(self.path("b", "config.json"))
+        model = VoxfieldTransformer(**config["network"])
+        held = transformer.loss_of(LocalSets(Grids([self.path("held.sgrid")], self.path("c")), config), config)
+        with contextlib.redirect_stdout(io.StringIO()):
+            trainer = Trainer(self.path("b"), model, config, None)
+        before = {name: p.clone() for name, p in model.named_parameters()}
+        self.assertAlmostEqual(trainer._held_out_loss(held), last["held_out"], 6)
+        self.assert_equal(dict(model.named_parameters()), before)
+        model.load_state_dict(trainer.average)
+        self.assertAlmostEqual(sum(float(held(model, step)[0]) for step in range(8)) / 8, last["held_out"], 6)
+
+    def test_shows_what_it_logs_in_tensorboard_where_that_is_installed(self):
+        with mock.patch.dict(sys.modules, {"torch.utils.tensorboard": None}):
+            with self.assertRaisesRegex(SystemExit, "tensorboard=true: .*; pip install tensorboard"):
+                self.trained("without", "--set", "tensorboard=true")
+        board = mock.Mock()
+        with mock.patch.dict(sys.modules, {"torch.utils.tensorboard": board}):
+            log = self.trained("with", "--set", "tensorboard=true")[1]
+        board.SummaryWriter.assert_called_once_with(self.path("with", "tensorboard"))
+        shown = {call.args for call in board.SummaryWriter().add_scalar.call_args_list}
+        self.assertEqual(shown, {(name, value, row["step"]) for row in log for name, value in row.items()
+                                 if name != "step"})
+
+
+class Places(unittest.TestCase):
+    SRUN = {"SLURM_JOB_ID": "1234", "SLURM_STEP_ID": "2", "SLURM_STEP_NUM_TASKS": "16", "SLURM_PROCID": "9",
+            "SLURM_LOCALID": "1", "SLURM_STEP_NODELIST": "gpu[07,09-10],cpu1"}
+
+    def test_are_what_the_launcher_says(self):
+        found = processes.rendezvous(self.SRUN)
+        self.assertEqual({**found, "MASTER_PORT": None}, {"RANK": "9", "WORLD_SIZE": "16", "LOCAL_RANK": "1",
+                                                          "MASTER_ADDR": "gpu07", "MASTER_PORT": None})
+        given = {"MASTER_ADDR": "10.0.0.1", "MASTER_PORT": "29500"}
+        self.assertLess(given.items(), processes.rendezvous({**self.SRUN, **given}).items())
+        self.assertNotEqual(processes.rendezvous({**self.SRUN, "SLURM_STEP_ID": "3"})["MASTER_PORT"], found["MASTER_PORT"])
+        self.assertEqual(processes.rendezvous({"SLURM_NTASKS": "16", "SLURM_PROCID": "0"}), {})  # a batch script
+        torchrun = {"RANK": "1", "WORLD_SIZE": "2", "LOCAL_RANK": "1", "MASTER_ADDR": "n1", "MASTER_PORT": "1"}
+        self.assertEqual(processes.rendezvous({**self.SRUN, **torchrun}), torchrun)
+
+    def test_of_nodes_are_read_from_slurms_short_form(self):
+        for nodes, first in (("n1", "n1"), ("gpu[07-09,12],login", "gpu07"), ("a-[1,3]-ib", "a-1-ib"),
+                             ("r[2-3]n[05-08]", "r2n05"), ("b,a[1-2]", "b")):
+            self.assertEqual(processes.first_host(nodes), first)
+
+
+if __name__ == "__main__":
+    unittest.main()
