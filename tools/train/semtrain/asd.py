@@ -47,8 +47,8 @@ class Batches:
         self.crop = (min(config["crop"][0], h), min(config["crop"][1], w))
 
     def make(self, step, part=None):
-        """-> truth, previous (with noise on it, or zeros), buffer [B, 4, h, w], visible [B, 1, h, w]; of `part` alone, a
-        range of the batch"""
+        """-> truth, previous (with noise on it, or zeros), buffer [B, 4, h, w], visible [B, 1, h, w]; of `part` alone,
+        a range of the batch"""
         draw, rows = generator(self.config, step), []
         for _ in range(self.config["batch"]):
             sequence, i = self.frames[number_below(len(self.frames), draw)]
@@ -163,7 +163,7 @@ def main(arguments=None):
     p = settings.parser("asd", __doc__.splitlines()[0])
     p.add_argument("--frames", required=True, help="folder of drives (see semtrain/frames.py)")
     p.add_argument("--vae", required=True, help="folder of the VAE (config.json, safetensors); it stays as it is")
-    p.add_argument("--held-out", help="folder of drives; with each checkpoint their loss is logged, and the first is drawn")
+    p.add_argument("--held-out", help="folder of drives; each checkpoint logs their loss, and draws of the first")
     p.add_argument("--init", help="model folder to start from: a renderer, or Stable Diffusion 1.5")
     p.add_argument("--cache", help="folder for the frames' latents; default: OUT/latents")
     options = p.parse_args(arguments)

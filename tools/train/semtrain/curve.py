@@ -30,7 +30,7 @@ def draw_curve(log, picture):
     axes.plot(steps, losses, color="0.75", linewidth=0.8, label="mean of 20 s")
     axes.plot(steps, smooth, color="C0", linewidth=1.5, label="running mean")
     if held_out:
-        axes.plot([r["step"] for r in held_out], [r["held_out"] for r in held_out], color="C1", marker=".", label="held out")
+        axes.plot([r["step"] for r in held_out], [r["held_out"] for r in held_out], "C1.-", label="held out")
     axes.set_xlabel("step")
     axes.set_ylabel("loss")
     axes.set_yscale("log")

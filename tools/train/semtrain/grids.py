@@ -180,7 +180,7 @@ class LocalSets:
         return drawn_boxes(random, parts, boxes, config), has_part, tints, has_tint
 
     def _draw(self, random, size):
-        """of a set: which grid, where in its sums, whether x and y are turned over, and an order of its points or None"""
+        """of a set: which grid, where in its sums, whether x and y are turned over, an order of its points or None"""
         grid, place = int(random.integers(len(self.near))), random.random()
         turned = [self.config["mirror"] and random.random() < 0.5 for _ in range(2)]
         points = (size, self.grids.tokens.shape[1] // 6)

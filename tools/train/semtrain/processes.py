@@ -12,6 +12,7 @@ import torch
 from torch import distributed
 
 PATIENCE = datetime.timedelta(hours=12)  # for rank 0, which may encode all frames before the first step
+SMALL = 1 << 18  # numbers of a gradient
 
 
 def first_host(node_list):
@@ -71,11 +72,25 @@ def gathered(numbers):
     return torch.stack(rows).cpu()
 
 
-def add_gradients(parameters):
-    """every gradient := the sum of all processes'"""
+def share(tensors):
+    """all have those of rank 0 from now on"""
     if count() > 1:
-        for done in [distributed.all_reduce(p.grad, async_op=True) for p in parameters if p.grad is not None]:
-            done.wait()
+        for tensor in tensors:
+            distributed.broadcast(tensor, 0)
+
+
+def add_gradients(parameters):
+    """every gradient := the sum of all processes'; small ones go together, as each message takes its time"""
+    if count() == 1:
+        return
+    gradients = [p.grad for p in parameters if p.grad is not None]
+    small = [g for g in gradients if g.numel() < SMALL]
+    together = torch.cat([g.flatten() for g in small]) if small else None
+    messages = [g for g in gradients if g.numel() >= SMALL] + ([together] if small else [])
+    for done in [distributed.all_reduce(message, async_op=True) for message in messages]:
+        done.wait()
+    for g, part in zip(small, together.split([g.numel() for g in small]) if small else []):
+        g.copy_(part.view(g.shape))
 
 
 @contextlib.contextmanager

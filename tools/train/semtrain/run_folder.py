@@ -13,8 +13,8 @@ CHECKPOINT = "checkpoint.safetensors"
 LOG = "log.jsonl"
 SETTINGS = "config.json"
 # nothing that has been learnt
-MAY_CHANGE = ("steps", "minutes", "save_minutes", "device", "workers", "mantissa_bits", "defaults", "accumulate", "recompute",
-              "keep", "tensorboard")
+MAY_CHANGE = ("steps", "minutes", "save_minutes", "device", "workers", "mantissa_bits", "defaults", "accumulate",
+              "recompute", "keep", "tensorboard")
 
 
 class RunFolder:

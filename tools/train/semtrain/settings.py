@@ -12,8 +12,8 @@ from .model_folder import HALF_BITS
 
 CONFIGS = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "configs")
 COMMON = {"seed": 1, "precision": "bf16", "device": "cuda" if torch.cuda.is_available() else "cpu", "minutes": 0.0,
-          "save_minutes": 10.0, "workers": 0, "warmup": 200, "decay": 0.3, "ema": 0.999, "clip": 1.0, "mantissa_bits": HALF_BITS,
-          "accumulate": 1, "recompute": False, "keep": 1, "tensorboard": False}
+          "save_minutes": 10.0, "workers": 0, "warmup": 200, "decay": 0.3, "ema": 0.999, "clip": 1.0,
+          "mantissa_bits": HALF_BITS, "accumulate": 1, "recompute": False, "keep": 1, "tensorboard": False}
 
 
 def parser(recipe, about):
@@ -26,8 +26,8 @@ def parser(recipe, about):
 
 
 def resolve(recipe, options):
-    """the settings of a run: COMMON, then the file, then --set. A misspelt key is an error. The process joins those that
-    train with it."""
+    """the settings of a run: COMMON, then the file, then --set. A misspelt key is an error. The process joins those
+    that train with it."""
     path = options.config
     if not path.endswith(".json"):
         path = os.path.join(CONFIGS, f"{recipe}.{options.config}.json")

@@ -46,8 +46,8 @@ def scalar_writer(folder):
 
 class Trainer:
     """A model and a folder. `config` has the settings of settings.COMMON, steps, batch and learning_rate;
-    `export(state)` writes the engine's files from the averaged weights. Where several processes train (processes.py) all
-    have one, and that of rank 0 writes."""
+    `export(state)` writes the engine's files from the averaged weights. Where several processes train (processes.py)
+    each has one, and that of rank 0 writes."""
 
     def __init__(self, folder, model, config, export):
         self.folder, self.config, self.export = folder, config, export
@@ -59,6 +59,7 @@ class Trainer:
         if config["recompute"]:
             recompute_blocks(self.model)
         self.parameters = dict(self.model.named_parameters())
+        processes.share([p.data for p in self.parameters.values()])  # drawn after a VAE's, where rank 0 needed one
         self.average = {name: p.detach().clone() for name, p in self.parameters.items()}
         self.adam = torch.optim.Adam(self.model.parameters(), lr=config["learning_rate"], betas=(0.9, 0.99))
         self.step = 0
@@ -140,7 +141,8 @@ class Trainer:
         own = [sum(row[name] for row in rows) / len(rows) for name in rows[0]]
         numbers = dict(zip(rows[0], processes.gathered(own).mean(0).tolist()))
         if not math.isfinite(numbers["loss"]):
-            raise RuntimeError(f"the loss is {numbers['loss']} at step {self.step}; the last checkpoint is in {self.folder}")
+            raise RuntimeError(f"the loss is {numbers['loss']} at step {self.step}; the last checkpoint is in "
+                               f"{self.folder}")
         torch.nn.utils.clip_grad_norm_(self.model.parameters(), self.config["clip"])
         self.adam.step()
         self.step += 1
@@ -199,11 +201,11 @@ class Trainer:
         print(f"continuing {self.folder} at step {self.step}", flush=True)
 
     def _compare(self):
-        """all processes begin with the same weights"""
+        """all processes begin with the same weights, also where they read them"""
         begun = processes.gathered([self.step, sum(float(p.detach().double().sum()) for p in self.parameters.values())])
         if not (begun == begun[0]).all():
-            raise SystemExit(f"processes begin with different steps or weights: {begun.tolist()}; {self.folder}, --init "
-                             "and the data have to be on a file system that all nodes see")
+            raise SystemExit(f"processes begin with different steps or weights: {begun.tolist()}; {self.folder}, "
+                             "--init and the data have to be on a file system that all nodes see")
 
     def _stop(self, *_):
         self.signalled = True

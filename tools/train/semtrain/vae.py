@@ -32,8 +32,8 @@ class Pictures:
         self.buffers = [drive.buffer(n) for drive in drives for n in drive.numbers]
 
     def crops(self, config, step, part=None):
-        """-> [batch, 3, crop, crop], -1..1; the first round(buffer_share batch) are of buffers. Of `part` alone, a range
-        of the batch"""
+        """-> [batch, 3, crop, crop], -1..1; the first round(buffer_share batch) are of buffers. Of `part` alone, a
+        range of the batch"""
         draw = generator(config, step)
         size, out = config["crop"], []
         for i in range(config["batch"]):

@@ -162,7 +162,7 @@ def main(arguments=None):
     p = settings.parser("vsd", __doc__.splitlines()[0])
     p.add_argument("--frames", required=True, help="folder of drives (see semtrain/frames.py)")
     p.add_argument("--vae", required=True, help="folder of the VAE, of images or of videos; it stays as it is")
-    p.add_argument("--held-out", help="folder of drives; with each checkpoint their loss is logged, and the first is drawn")
+    p.add_argument("--held-out", help="folder of drives; each checkpoint logs their loss, and draws of the first")
     p.add_argument("--init", help="model folder to start from: a renderer of videos, or Stable Video Diffusion")
     p.add_argument("--cache", help="folder for the frames' latents; default: OUT/latents")
     options = p.parse_args(arguments)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""What does not change a run: how its batches are divided, among how many processes, what is computed again, and when it
-was killed."""
+"""What does not change a run: how its batches are divided, among how many processes, what is computed again, and when
+it was killed."""
 import contextlib
 import io
 import json
@@ -14,7 +14,6 @@ import socket
 import subprocess
 import sys
 import time
-import types
 import unittest
 from unittest import mock
 
@@ -22,10 +21,11 @@ import torch
 from torch.nn import functional as F
 
 from recipe import RUN
-from semtrain import asd, processes, safetensors_file, transformer, vae, vsd
-from semtrain.draws import Draws, generator
+from semtrain import asd, latents, memory, model_folder, processes, safetensors_file, settings, transformer, vae, vsd
+from semtrain.draws import Draws
+from semtrain.frames import find_drives
 from semtrain.grids import Grids, LocalSets
-from semtrain.json_file import read_json
+from semtrain.json_file import read_json, write_json
 from semtrain.nets import attention, recompute
 from semtrain.nets.transformer import VoxfieldTransformer
 from semtrain.run_folder import RunFolder
@@ -40,23 +40,21 @@ FORK = multiprocessing.get_context("fork")  # no import of torch a process
 
 class Attention(unittest.TestCase):
     def test_by_the_fused_kernel_is_what_it_is_written_out(self):
-        private = getattr(F, "_scaled_dot_product_attention", None)  # of PyTorch 1.13, whose public name is not there yet
+        private = getattr(F, "_scaled_dot_product_attention", None)  # what PyTorch 1.13 has under this name alone
         fused = getattr(F, "scaled_dot_product_attention", None) or (lambda q, k, v, mask: private(q, k, v, mask)[0])
         torch.manual_seed(1)
         q, k, v = (torch.randn(2, 3, n, 16, requires_grad=True) for n in (20, 30, 30))
         masked = torch.zeros(2, 1, 20, 30).masked_fill_(torch.rand(2, 1, 20, 30) < 0.5, -1e9)
         for mask in (None, masked):
-            with mock.patch.object(F, "scaled_dot_product_attention", side_effect=fused, create=True) as called:
-                found = self.result(q, k, v, mask)
-                called.assert_called_once()
-            with mock.patch.object(attention, "F", types.SimpleNamespace()):
-                expected = self.result(q, k, v, mask)
-            for a, b in zip(found, expected):
+            with mock.patch.object(F, "scaled_dot_product_attention", fused, create=True):
+                found = self.result(attention.fused, q, k, v, mask)
+            for a, b in zip(found, self.result(attention.written_out, q, k, v, mask)):
                 torch.testing.assert_close(a, b, atol=2e-6, rtol=1e-5)
+        self.assertEqual(attention.attention_of is attention.fused, hasattr(F, "scaled_dot_product_attention"))
 
     @staticmethod
-    def result(*arguments):
-        out = attention.attend(*arguments)
+    def result(function, *arguments):
+        out = function(*arguments)
         return [out, *torch.autograd.grad(out.square().sum(), arguments[:3])]
 
 
@@ -160,13 +158,13 @@ class ARun(InAFolder):
         with open(self.path(folder, "log.jsonl")) as file:
             return safetensors_file.read(self.path(folder, "checkpoint.safetensors")), [json.loads(x) for x in file]
 
-    def start(self, environments, folder, *more):
+    def start(self, environments, *arguments, train=None):
         """a process for each -> [(process, file of what it prints)]"""
         started = []
         for i, environment in enumerate(environments):
             output = self.path(f"output{time.monotonic_ns()}-{i}")
             open(output, "w").close()
-            process = FORK.Process(target=in_process, args=(environment, output, self.train, folder, *more))
+            process = FORK.Process(target=in_process, args=(environment, output, train or self.train, *arguments))
             process.start()
             started.append((process, output))
         return started
@@ -200,7 +198,8 @@ class ARun(InAFolder):
     def test_accumulates_what_the_whole_batch_gives(self):
         whole, log = self.trained("whole")
         for parts in (2, 4):
-            found, found_log = self.trained(f"in{parts}", "--set", f"accumulate={parts}")
+            found, found_log = self.trained(f"in{parts}", "--set", f"accumulate={parts}", "--set",
+                                            f"workers={parts // 4}")
             # sums in another order; Adam's first steps, which divide by the gradient, make more of that
             self.assert_equal(found, whole, 2e-5)
             self.assertAlmostEqual(found_log[-1]["loss"], log[-1]["loss"], 5)
@@ -217,11 +216,37 @@ class ARun(InAFolder):
             self.assert_equal(found, parts)
             self.assertEqual([row["loss"] for row in found_log], [row["loss"] for row in log])
         self.trained("resumed", "--set", "minutes=0.000001", "--set", "accumulate=2")
-        self.assertEqual([code for code, _ in self.finish(self.start(self.two(), "resumed", "--set", "minutes=0.000001"))],
-                         [0, 0])
+        begun = self.finish(self.start(self.two(), "resumed", "--set", "minutes=0.000001"))
+        self.assertEqual([code for code, _ in begun], [0, 0])
         found = self.trained("resumed", "--set", "accumulate=2")[0]
         self.assert_equal(found, parts)
         self.assertEqual([row["step"] for row in self.state("resumed")[1]], [1, 2, 12])
+
+    def test_of_a_renderer_by_two_processes_has_the_bits_of_two_parts(self):
+        torch.manual_seed(1)
+        autoencoder = vae.AutoencoderKL(VAE)
+        model_folder.write_component(self.path("vae"), autoencoder.config_json(), autoencoder.state_dict())
+        draw_drive(self.path("frames"), 1)
+        write_json(self.path("asd.json"), ASD)
+
+        def train(folder, *more):
+            asd.main(["-o", self.path(folder), "--config", self.path("asd.json"), "--threads", "1", "--frames",
+                      self.path("frames"), "--vae", self.path("vae"), *more])
+        with contextlib.redirect_stdout(io.StringIO()):
+            train("parts", "--set", "accumulate=2")
+        with mock.patch.object(processes, "SMALL", 256):  # some go together, others each alone
+            (code, out), other = self.finish(self.start(self.two(), "two", train=train))
+        self.assertEqual((code, other), (0, (0, "")), out)
+        self.assert_equal(self.state("two")[0], self.state("parts")[0])
+
+    def test_is_started_by_torchrun(self):
+        torchrun = ["-m", "torch.distributed.run", "--standalone", "--nproc_per_node=2", "--no_python",
+                    "--redirects=2", "--tee=2", RUN]  # PyTorch 1.13 under Python 3.11 trips over its own defaults
+        done = subprocess.run([ENVIRONMENT["PYTHON"], *torchrun, *self.words("run", "--set", "accumulate=2")],
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=ENVIRONMENT)
+        self.assertEqual(done.returncode, 0, done.stdout)
+        self.assertEqual(done.stdout.count("step 12 "), 1, done.stdout)
+        self.assert_equal(self.state("run")[0], self.trained("alone", "--set", "accumulate=4")[0], 2e-5)
 
     def test_by_two_processes_stops_at_one_step_when_one_of_them_is_told_to(self):
         started = self.start(self.two(), "run", "--set", "steps=100000", "--set", "save_minutes=0")
@@ -304,6 +329,62 @@ class ARun(InAFolder):
                                  if name != "step"})
 
 
+class AStep(InAFolder):
+    def gradients(self, model, loss, parts):
+        """-> the loss and the gradients of a step, summed over its parts"""
+        model.zero_grad()
+        losses = [loss(model, 3, part)[0] / len(parts) for part in parts]
+        for of_part in losses:
+            of_part.backward()
+        return [sum(float(x) for x in losses)] + [p.grad.clone() for p in model.parameters() if p.grad is not None]
+
+    def check(self, model, loss, batch):
+        whole = self.gradients(model, loss, [range(batch)])
+        halves = [range(0, batch // 2), range(batch // 2, batch)]
+        for found, expected in zip(self.gradients(model, loss, halves), whole, strict=True):
+            torch.testing.assert_close(found, expected, atol=1e-6, rtol=1e-4)
+
+    def test_of_the_renderers_and_the_vae_is_what_its_parts_come_to(self):
+        torch.manual_seed(1)
+        drive = latents.Sequence({"truth": torch.randn(4, 4, 8, 8), "buffer": torch.randn(4, 4, 8, 8),
+                                  "visible": torch.rand(4, 1, 8, 8), "first": torch.tensor([1, 0, 0, 0])})
+        self.check(asd.Renderer(ASD), asd.loss_of(asd.Batches([drive], ASD), ASD), 4)
+        self.check(vsd.Renderer(VSD), vsd.loss_of(vsd.Batches([drive], VSD, {"scaling_factor": 0.5}), VSD), 2)
+        draw_drive(self.path("frames"), 1)
+        self.check(vae.AutoencoderKL(VAE), vae.loss_of(vae.Pictures(find_drives(self.path("frames"))), VAE), 4)
+
+    def test_of_a_network_with_batch_norms_is_not_divided(self):
+        config = {**settings.COMMON, "batch": 4, "accumulate": 2, "steps": 1, "learning_rate": 1}
+        with self.assertRaisesRegex(SystemExit, "this network has batch norms"):
+            Trainer(self.path("run"), torch.nn.BatchNorm1d(3), config, None)
+
+
+class Memory(unittest.TestCase):
+    def test_of_the_renderers_at_the_papers_sizes_is_that_of_one_card(self):
+        for recipe, most in (("asd", 22), ("vsd", 76)):
+            config = settings.resolve(recipe, settings.parser(recipe, "").parse_args(["-o", "", "--threads", "1"]))
+            fixed, activations = memory.bytes_of(recipe, config)
+            held = {how: (sum(fixed.values()) + size) / memory.GIB for how, size in activations.items()}
+            self.assertLess(held["attention fused, blocks recomputed"], most)
+            self.assertGreater(held["attention fused"], most)
+            if recipe == "asd":
+                text = 77 * 768
+                self.assertEqual(fixed, {"weights": 4 * (859546884 + text), "gradients": 4 * 859546884,
+                                         "Adam": 8 * 859546884, "average": 4 * (859546884 + text)})
+
+    def test_of_attention_is_its_matrix(self):
+        with memory.OnMeta():
+            q, k, v = (torch.empty(2, 3, n, 8, requires_grad=True) for n in (20, 30, 30))
+            model = torch.nn.Module()
+            model.forward = lambda: attention.attend(q, k, v)
+            held = [memory.Kept(model, (), attend).whole() for attend in (attention.written_out,
+                                                                          memory.FusedAttention.apply)]
+        rows = 2 * 3 * 4
+        both = rows * 8 * (20 + 30 + 30)
+        self.assertAlmostEqual(held[0], both + rows * 20 * 30, delta=8)  # the scale
+        self.assertEqual(held[1], both + rows * (20 * 8 + 20))
+
+
 class Places(unittest.TestCase):
     SRUN = {"SLURM_JOB_ID": "1234", "SLURM_STEP_ID": "2", "SLURM_STEP_NUM_TASKS": "16", "SLURM_PROCID": "9",
             "SLURM_LOCALID": "1", "SLURM_STEP_NODELIST": "gpu[07,09-10],cpu1"}
@@ -314,7 +395,8 @@ class Places(unittest.TestCase):
                                                           "MASTER_ADDR": "gpu07", "MASTER_PORT": None})
         given = {"MASTER_ADDR": "10.0.0.1", "MASTER_PORT": "29500"}
         self.assertLess(given.items(), processes.rendezvous({**self.SRUN, **given}).items())
-        self.assertNotEqual(processes.rendezvous({**self.SRUN, "SLURM_STEP_ID": "3"})["MASTER_PORT"], found["MASTER_PORT"])
+        other = processes.rendezvous({**self.SRUN, "SLURM_STEP_ID": "3"})
+        self.assertNotEqual(other["MASTER_PORT"], found["MASTER_PORT"])
         self.assertEqual(processes.rendezvous({"SLURM_NTASKS": "16", "SLURM_PROCID": "0"}), {})  # a batch script
         torchrun = {"RANK": "1", "WORLD_SIZE": "2", "LOCAL_RANK": "1", "MASTER_ADDR": "n1", "MASTER_PORT": "1"}
         self.assertEqual(processes.rendezvous({**self.SRUN, **torchrun}), torchrun)

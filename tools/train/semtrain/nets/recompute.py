@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Activations that are computed again when the backward pass needs them, in place of being kept (Chen et al. 2016, arXiv
-1604.06174)."""
+"""Activations that are computed again when the backward pass needs them, in place of being kept (Chen et al. 2016,
+arXiv 1604.06174)."""
 from functools import partial
 
 from torch.utils.checkpoint import checkpoint
@@ -29,6 +29,7 @@ def recompute_blocks(model):
     """from now on only the inputs of blocks are kept for the backward pass"""
     blocks = list(blocks_of(model))
     if not blocks:
-        raise SystemExit("recompute: this network has no block of these: " + ", ".join(kind.__name__ for kind in BLOCKS))
+        names = ", ".join(kind.__name__ for kind in BLOCKS)
+        raise SystemExit(f"recompute: this network has no block of these: {names}")
     for block in blocks:
         block.forward = partial(checkpoint, block.forward, use_reentrant=False, preserve_rng_state=False)
