@@ -65,9 +65,10 @@ class Trainer:
         self.step = 0
         self.signalled = False
         with processes.rank_0_first():
-            self.place = RunFolder(folder, alone=processes.rank() == 0)
+            writes = processes.rank() == 0
+            self.place = RunFolder(folder, alone=writes)
             self.place.keep_settings(config)
-        self.board = scalar_writer(self.place.file("tensorboard")) if config["tensorboard"] else None
+            self.board = scalar_writer(self.place.file("tensorboard")) if config["tensorboard"] and writes else None
         self._resume()
 
     def start_from(self, state):
@@ -181,6 +182,7 @@ class Trainer:
         if self.board:
             for name in row.keys() - {"step"}:
                 self.board.add_scalar(name, row[name], row["step"])
+            self.board.flush()
         print(" ".join(f"{k} {v:.5g}" for k, v in row.items()), flush=True)
 
     def _resume(self):
