@@ -30,7 +30,6 @@ START = time.monotonic()
 COMPILE_AFTER_FILE = 20.0  # seconds after --wait's file appeared during which another network may begin to compile
 MEASURE_MIN, MEASURE_MAX, SAMPLE_MS = 0.4, 3.0, 2.0  # seconds of a measurement; what one sample lasts at least
 UNIT = {"tflops": 1e9, "gb_s": 1e6, "mpairs_s": 1e3}  # of a rate: operations, bytes or pairs in a millisecond
-HAS_SDPA = hasattr(F, "scaled_dot_product_attention")
 USERS = (unet, vae, transformer)  # of nets/attention.py
 attention_mask = transformer.VoxfieldTransformer.attention_mask
 
@@ -48,10 +47,8 @@ def emit(what, mode, peer="torch", **fields):
 
 
 def attend(q, k, v, mask=None):
-    """in place of nets/attention.py's; the fused kernels want four dimensions"""
-    if q.dim() == 3:
-        return attend(q[:, None], k[:, None], v[:, None], mask)[:, 0]
-    return F.scaled_dot_product_attention(q, k, v, attn_mask=mask) if HAS_SDPA else attention._attend(q, k, v, mask)
+    """in place of nets/attention.py's: in the precision of its arguments, whatever the device"""
+    return attention.attention_of(q, k, v, mask)
 
 
 def patch_networks(dtype):

@@ -12,12 +12,13 @@ import shutil
 import torch
 from torch import nn
 
-from . import model_folder, safetensors_file, settings
+from . import model_folder, processes, safetensors_file, settings
 from .denoising import alphas_cumprod, ddim_timesteps, denoise, input_of, noise_of, scheduler_of
+from .draws import draws, generator, number_below, timesteps_at
 from .frames import find_drives, splats_of, to_pixels, write_beside
 from .latents import load_vae, sequences
 from .nets.unet import UNet2DConditionModel
-from .trainer import Trainer, generator, number_below, timesteps_at
+from .trainer import Trainer
 
 INDEX = {"renderer": ["diffusers", "UNet2DConditionModel"], "vae": ["diffusers", "AutoencoderKL"],
          "scheduler": ["diffusers", "DDIMScheduler"]}
@@ -45,12 +46,14 @@ class Batches:
         h, w = self.frames[0][0].truth.shape[2:]
         self.crop = (min(config["crop"][0], h), min(config["crop"][1], w))
 
-    def make(self, step):
-        """-> truth, previous (with noise on it, or zeros), buffer [B, 4, h, w], visible [B, 1, h, w]"""
+    def make(self, step, part=None):
+        """-> truth, previous (with noise on it, or zeros), buffer [B, 4, h, w], visible [B, 1, h, w]; of `part` alone,
+        a range of the batch"""
         draw, rows = generator(self.config, step), []
         for _ in range(self.config["batch"]):
             sequence, i = self.frames[number_below(len(self.frames), draw)]
             rows.append(self._frame(sequence, i, draw))
+        rows = rows if part is None else rows[part.start:part.stop]
         return [torch.stack(parts).to(self.config["device"]) for parts in zip(*rows)]
 
     def _frame(self, s, i, draw):
@@ -82,18 +85,23 @@ def draw_timesteps(n, config, draw):
     return t
 
 
-def step_loss(model, batch, alphas, config, draw):
-    """-> loss, {eps: the plain error of the noise}"""
+def step_loss(model, batch, alphas, config, random):
+    """random: Draws -> loss, {eps: the plain error of the noise}"""
     truth, previous, buffer, visible = batch
-    n = len(truth)
-    t = draw_timesteps(n, config, draw)
-    noise = torch.randn(truth.shape, generator=draw).to(truth.device)
-    a = alphas[t].view(n, 1, 1, 1).to(truth.device)
+    t = random.of_part(draw_timesteps(random.batch, config, random.random))
+    noise = random.normal(truth.shape[1:]).to(truth.device)
+    a = alphas[t].view(-1, 1, 1, 1).to(truth.device)
     noisy = a.sqrt() * truth + (1 - a).sqrt() * noise
     made = model(noisy, previous, buffer, visible, t.to(truth.device)).float()
     error = (noise_of(made, noisy, a, config["prediction_type"]) - noise).square().mean((1, 2, 3))
     weight = 1 / a.flatten() if config["weighting"] == "v" else torch.ones_like(error)
     return (weight * error).mean(), {"eps": float(error.mean())}
+
+
+def loss_of(batches, config):
+    alphas = alphas_cumprod()
+    return lambda model, step, part: step_loss(model, batches.make(step, part), alphas, config,
+                                               draws(config, step, 1, part))
 
 
 class Export:
@@ -155,7 +163,7 @@ def main(arguments=None):
     p = settings.parser("asd", __doc__.splitlines()[0])
     p.add_argument("--frames", required=True, help="folder of drives (see semtrain/frames.py)")
     p.add_argument("--vae", required=True, help="folder of the VAE (config.json, safetensors); it stays as it is")
-    p.add_argument("--held-out", help="folder of drives; the first is drawn at each checkpoint")
+    p.add_argument("--held-out", help="folder of drives; each checkpoint logs their loss, and draws of the first")
     p.add_argument("--init", help="model folder to start from: a renderer, or Stable Diffusion 1.5")
     p.add_argument("--cache", help="folder for the frames' latents; default: OUT/latents")
     options = p.parse_args(arguments)
@@ -165,16 +173,17 @@ def main(arguments=None):
     torch.manual_seed(config["seed"])
     drives = find_drives(options.frames)
     config["defaults"] = splats_of(drives, config["defaults"])
-    batches = Batches(sequences(options.vae, drives, cache, config["mirror"]), config)
-    held = find_drives(options.held_out)[:1] if options.held_out else []
-    held = (sequences(options.vae, held, cache, False)[0], held[0]) if held else None
+    held = find_drives(options.held_out) if options.held_out else []
+    with processes.rank_0_first():
+        batches = Batches(sequences(options.vae, drives, cache, config["mirror"]), config)
+        held_out = sequences(options.vae, held, cache, False)
     print(f"{len(batches.frames)} frames, mirror images counted", flush=True)
     model = Renderer(config).to(memory_format=torch.channels_last)
-    trainer = Trainer(options.output, model, config, Export(options.output, config, options.vae, held))
+    trainer = Trainer(options.output, model, config, Export(options.output, config, options.vae,
+                                                            (held_out[0], held[0]) if held else None))
     if state:
         trainer.start_from(state)
-    alphas = alphas_cumprod()
-    trainer.run(lambda m, step: step_loss(m, batches.make(step), alphas, config, generator(config, step, 1)))
+    trainer.run(loss_of(batches, config), loss_of(Batches(held_out, config), config) if held else None)
 
 
 if __name__ == "__main__":

@@ -6,11 +6,12 @@ import os
 
 
 def draw_curve(log, picture):
-    """the loss of each row, and its running mean"""
+    """the loss of each row, its running mean, and the loss of held-out data where the log has it"""
     if not os.path.exists(log):
         return
     with open(log) as file:
-        rows = [json.loads(line) for line in file]
+        all_rows = [json.loads(line) for line in file]
+    rows, held_out = ([r for r in all_rows if name in r] for name in ("loss", "held_out"))
     if len(rows) < 2:
         return
     try:
@@ -28,6 +29,8 @@ def draw_curve(log, picture):
     figure, axes = pyplot.subplots(figsize=(7, 4), dpi=110)
     axes.plot(steps, losses, color="0.75", linewidth=0.8, label="mean of 20 s")
     axes.plot(steps, smooth, color="C0", linewidth=1.5, label="running mean")
+    if held_out:
+        axes.plot([r["step"] for r in held_out], [r["held_out"] for r in held_out], "C1.-", label="held out")
     axes.set_xlabel("step")
     axes.set_ylabel("loss")
     axes.set_yscale("log")

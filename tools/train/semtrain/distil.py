@@ -6,7 +6,7 @@ import os
 
 import torch
 
-from .grids import Grids, LocalSets
+from .draws import draws
 from .json_file import read_json
 from .low_rank import merged, read_adapter
 from .model_folder import add_to_index, read_component, write_component, write_scheduler
@@ -15,8 +15,8 @@ from .prefetch import Prefetched
 from .regenerate import load_transformer, network_of
 from .sampler import Guidance, guided_x0, linear_alphas, steps_of
 from .settings import parser, resolve
-from .trainer import Trainer, generator
-from .transformer import mean_error, noised_sets, weights_of
+from .trainer import Trainer
+from .transformer import mean_error, noised_sets, sets_of, weights_of
 
 TRANSFORMER, SCHEDULER = "voxfield_transformer", "voxfield_scheduler"
 
@@ -53,7 +53,7 @@ class Teacher:
             x0 = guided_x0(self.model, self.guidance, x, labels, centers, valid, t, condition)
             total, share = of_x * total + of_x0 * x0, of_x * share + of_x0
             if row + 1 < count:
-                noise = torch.randn(x.shape, generator=random).to(x.device).unflatten(2, (-1, 2, 3))
+                noise = random.normal(x.shape[1:]).to(x.device).unflatten(2, (-1, 2, 3))
                 noise = (noise * fresh[:, None, None, :, None]).flatten(2)
                 x = torch.where(known[..., None], x, of_x0 * x0 + of_x * x + noise)
         return total / share
@@ -68,14 +68,14 @@ class Distillation:
         self.weights = weights_of(self.alphas, config["snr_gamma"])
         self.first = teacher.first_steps(config["teacher_steps"]).to(config["device"])
 
-    def drawn(self, step, rows=None):
-        """rows [B]: which of the student's steps, drawn where it is None -> x, t, the other inputs of a network, the
-        teacher's x0, the voxels that are not known"""
-        config, random = self.config, generator(self.config, step)
+    def drawn(self, step, rows=None, part=None):
+        """rows [B]: which of the student's steps, drawn where it is None; part: a range of the batch's sets, None: all
+        -> x, t, the other inputs of a network, the teacher's x0, the voxels that are not known"""
+        config, random = self.config, draws(self.config, step, part=part)
         centers, labels, tokens, known, condition = (
-            torch.from_numpy(part).to(config["device"]) for part in self.sets.batch(step))
+            torch.from_numpy(array).to(config["device"]) for array in self.sets.batch(step, part))
         if rows is None:
-            rows = torch.randint(len(self.first), (len(tokens),), generator=random)
+            rows = random.below(len(self.first))
         first = self.first[rows.to(self.first.device)]
         t = self.teacher.steps.timesteps[first]
         x = noised_sets(tokens, known, condition, t, self.alphas, config, random)
@@ -83,8 +83,8 @@ class Distillation:
         x0 = self.teacher.x0_of(first, config["teacher_steps"], x, known, random, *others, condition)
         return x, t, others, condition, x0, ~known
 
-    def loss(self, model, step):
-        x, t, others, condition, x0, target = self.drawn(step)
+    def loss(self, model, step, part=None):
+        x, t, others, condition, x0, target = self.drawn(step, part=part)
         made = model(x, *others, t, condition).float()
         places, colors = mean_error(made, x0, target, self.config["hue_weight"])
         of_colors = self.config["color_weight"]
@@ -112,6 +112,7 @@ def main(arguments=None):
     p = parser("distil", __doc__)
     p.set_defaults(config="distil")
     p.add_argument("--grids", nargs="+", required=True, help=".sgrid files with points, or folders of them")
+    p.add_argument("--held-out", nargs="+", default=[], help="the same, of which the loss is logged alone")
     p.add_argument("--teacher", required=True, help="model folder; its defaults say how it samples")
     p.add_argument("--init", help="a voxfield_transformer folder to start from; default: the teacher's")
     options = p.parse_args(arguments)
@@ -124,11 +125,13 @@ def main(arguments=None):
     trainer = Trainer(options.output, student, config, exporter(options.output, config, teacher))
     init = options.init or os.path.join(options.teacher, TRANSFORMER)
     trainer.start_from(merged(read_component(init)[1], read_adapter(init)))
-    sets = LocalSets(Grids(options.grids, os.path.join(options.output, "cache")), config)
+    sets, held = sets_of(options.grids, options.output, "cache", config), None
+    if options.held_out:
+        held = Distillation(teacher, sets_of(options.held_out, options.output, "cache_held_out", config), config).loss
     distillation = Distillation(teacher, Prefetched(sets, config["workers"]), config)
     print(f"{len(teacher.steps.timesteps)} steps of the teacher become {len(distillation.first)}; "
           f"{len(sets.grids.labels)} cells", flush=True)
-    trainer.run(distillation.loss)
+    trainer.run(distillation.loss, held)
 
 
 if __name__ == "__main__":

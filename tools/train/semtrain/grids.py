@@ -125,22 +125,27 @@ class LocalSets:
         self.sums = grids.balance(config["class_balance"])
         self.near = [np.array(grids.cells[a:b], np.float32) for a, b in zip(grids.offsets, grids.offsets[1:])]
 
-    def batch(self, step):
+    def batch(self, step, part=None):
         """of one size: centers [B, N, 3] metres, labels [B, N], tokens [B, N, 6n], known [B, N], conditions [B, N, W];
-        fp64, i64, fp32, bool, fp32"""
+        fp64, i64, fp32, bool, fp32. Those of `part` alone, a range of the batch's sets, with the numbers that they have
+        in the whole batch"""
         c = self.config
+        part = range(c["batch"]) if part is None else part
         random = np.random.default_rng([c["seed"], step])
         size = int(random.integers(c["set_size"][0], c["set_size"][1] + 1))
         size = min(size, min(len(n) for n in self.near))
-        sets = [self._set(random, size) for _ in range(c["batch"])]
-        centers, labels, tokens, cells, boxes, part_boxes = (np.stack(part) for part in zip(*sets))
+        drawn = [self._draw(random, size) for _ in range(c["batch"])]
+        sets = [self._set(size, *drawn[i]) for i in part]
+        centers, labels, tokens, cells, boxes, part_boxes = (np.stack(of_sets) for of_sets in zip(*sets))
         labels = labels.astype(np.int64)
-        dropped = random.random(c["batch"]) < c["label_dropout"]
+        dropped = (random.random(c["batch"]) < c["label_dropout"])[part.start:part.stop]
         labels[dropped] = c["network"]["num_classes"]
-        known = np.stack([draw_known(random, set_centers, c["known_share"]) for set_centers in centers])
+        others = np.zeros((size, 3))  # which draw as many numbers wherever their voxels are
+        known = [draw_known(random, centers[part.index(i)] if i in part else others, c["known_share"])
+                 for i in range(part.stop)]
         conditions = np.stack([self._condition(np.random.default_rng([c["seed"], step, i]), *of_set)
-                               for i, of_set in enumerate(zip(centers, cells, boxes, part_boxes, tokens, dropped))])
-        return centers, labels, tokens, known, conditions
+                               for i, of_set in zip(part, zip(centers, cells, boxes, part_boxes, tokens, dropped))])
+        return centers, labels, tokens, np.stack(known[part.start:]), conditions
 
     def _condition(self, random, centers, cells, boxes, part_boxes, tokens, dropped):
         """what a set is conditioned on beside its labels; where these are dropped, nothing. With all colours given,
@@ -174,11 +179,17 @@ class LocalSets:
         tints = drawn_tints(random, parts, tints, tints, config)
         return drawn_boxes(random, parts, boxes, config), has_part, tints, has_tint
 
-    def _set(self, random, size):
+    def _draw(self, random, size):
+        """of a set: which grid, where in its sums, whether x and y are turned over, an order of its points or None"""
+        grid, place = int(random.integers(len(self.near))), random.random()
+        turned = [self.config["mirror"] and random.random() < 0.5 for _ in range(2)]
+        points = (size, self.grids.tokens.shape[1] // 6)
+        return grid, place, turned, None if self.config["ordered_points"] else random.random(points).argsort(1)
+
+    def _set(self, size, g, place, turned, order):
         """-> centers, labels, tokens, which voxels of the grids these are, and the boxes of their objects and parts"""
-        g = int(random.integers(len(self.near)))
         cells, first = self.near[g], self.grids.offsets[g]
-        middle = min(int(np.searchsorted(self.sums[g], random.random())), len(cells) - 1)
+        middle = min(int(np.searchsorted(self.sums[g], place)), len(cells) - 1)
         apart = ((cells - cells[middle]) ** 2).sum(1)
         chosen = np.argpartition(apart, size - 1)[:size]
         centers = (cells[chosen].astype(np.float64) + 0.5) * self.config["network"]["voxel_size"]
@@ -186,13 +197,12 @@ class LocalSets:
         boxes, part_boxes = (of[numbers[first + chosen]] if len(of) else np.ones((size, 7))
                              for of, numbers in ((self.grids.boxes, self.grids.owners),
                                                  (self.grids.part_boxes, self.grids.parts)))
-        turned = [self.config["mirror"] and random.random() < 0.5 for _ in range(2)]
         for axis in np.flatnonzero(turned):  # streets mirrored in either direction are streets
             centers[:, axis] *= -1
             tokens[..., axis] *= -1
             boxes, part_boxes = mirrored(boxes, axis), mirrored(part_boxes, axis)
         if any(turned):  # points of a lattice are equally far from the centre: their order turns over, too
             tokens = np.take_along_axis(tokens, token_order(tokens), 1)
-        if not self.config["ordered_points"]:
-            tokens = np.take_along_axis(tokens, random.random(tokens.shape[:2]).argsort(1)[..., None], 1)
+        if order is not None:
+            tokens = np.take_along_axis(tokens, order[..., None], 1)
         return centers, self.grids.labels[first + chosen], tokens.reshape(size, -1), first + chosen, boxes, part_boxes

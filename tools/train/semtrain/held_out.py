@@ -9,11 +9,11 @@ import tempfile
 import torch
 
 from .condition import WIDTHS
+from .draws import draws
 from .grids import Grids, LocalSets
 from .precision import autocast
 from .regenerate import load_transformer
 from .sampler import linear_alphas
-from .trainer import generator
 from .transformer import mean_error, noised
 
 LEVELS = (200, 600, 999)
@@ -41,7 +41,7 @@ def errors_of(model, sets, batches, given, levels=LEVELS):
         valid, parts = torch.ones_like(known), model.config["condition"]
         for i, level in enumerate(levels):
             t = torch.full((len(x0),), level)
-            noisy = noised(x0, alphas, t, generator(CONFIG, step, i))
+            noisy = noised(x0, alphas, t, draws(CONFIG, step, i))
             with autocast("bf16", "cpu"):
                 made = model(noisy, labels, centers, valid, t, only_given(conditions, parts, given))
             sums[i] += torch.stack([e.mean() for e in mean_error(made.float(), x0, ~known)]) / batches

@@ -17,11 +17,12 @@ from torch.nn import functional as F
 
 from . import safetensors_file, settings
 from .damage import KINDS, LEAST, spoil
+from .draws import generator, number_below
 from .frames import find_drives, picture_name
 from .json_file import write_json
 from .nets.inception import Inception, resized
 from .nets.norms import averaged
-from .trainer import Trainer, generator, number_below
+from .trainer import Trainer
 
 CLASSES = 20
 NORM_STREAM, JUDGED_STREAM = 1, 2  # of crops that batch norms are measured on, and that held-out drives are judged on
@@ -102,7 +103,7 @@ class Asked(nn.Module):
 
 
 def loss_of(frames, config):
-    def loss(model, step):
+    def loss(model, step, _=None):
         images, shares, strengths = (t.to(config["device"]) for t in frames.batch(config, step))
         model.train()
         shows, spoilt = model(images)

@@ -26,7 +26,7 @@ def loss_of(batches, config):
     device = config["device"]
     weights = torch.from_numpy(batches.class_weights(config["class_balance"])).to(device)
 
-    def loss(model, step):
+    def loss(model, step, _=None):
         positions, inputs, labels = (torch.from_numpy(a).to(device) for a in batches.batch(step))
         model.train()
         labels = labels[:, :config["loss_points"]].flatten()

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from .condition import vector_of
+from .draws import Draws
 from .grids import read_tokens
 from .low_rank import merged, read_adapter
 from .model_folder import read_component
@@ -121,7 +122,7 @@ def denoise_sets(model, sets, cells, labels, tokens, conditions, out, first, ran
     of_rows, conditions = torch.from_numpy(labels[rows].astype(np.int64)), torch.from_numpy(conditions[rows])
     alphas = linear_alphas({"beta_start": 1e-4, "beta_end": 0.02, "num_train_timesteps": 1000})
     levels = levels_between(first, STEPS)
-    x = noised(x0, alphas, torch.full((len(x0),), first), random)
+    x = noised(x0, alphas, torch.full((len(x0),), first), Draws(random, len(x0)))
     for t, after in zip(levels, levels[1:]):
         with autocast("bf16", "cpu"):
             made = model(x, of_rows, centers, valid, torch.full((len(x),), t), conditions).float().clamp(-1, 1)

@@ -7,11 +7,13 @@ import os
 
 import torch
 
+from . import processes
 from .model_folder import HALF_BITS
 
 CONFIGS = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "configs")
 COMMON = {"seed": 1, "precision": "bf16", "device": "cuda" if torch.cuda.is_available() else "cpu", "minutes": 0.0,
-          "save_minutes": 10.0, "workers": 0, "warmup": 200, "decay": 0.3, "ema": 0.999, "clip": 1.0, "mantissa_bits": HALF_BITS}
+          "save_minutes": 10.0, "workers": 0, "warmup": 200, "decay": 0.3, "ema": 0.999, "clip": 1.0,
+          "mantissa_bits": HALF_BITS, "accumulate": 1, "recompute": False, "keep": 1, "tensorboard": False}
 
 
 def parser(recipe, about):
@@ -24,7 +26,8 @@ def parser(recipe, about):
 
 
 def resolve(recipe, options):
-    """the settings of a run: COMMON, then the file, then --set. A misspelt key is an error."""
+    """the settings of a run: COMMON, then the file, then --set. A misspelt key is an error. The process joins those
+    that train with it."""
     path = options.config
     if not path.endswith(".json"):
         path = os.path.join(CONFIGS, f"{recipe}.{options.config}.json")
@@ -41,7 +44,11 @@ def resolve(recipe, options):
     bits = config["mantissa_bits"]
     if not isinstance(bits, int) or bits not in range(1, HALF_BITS + 1):
         raise SystemExit(f"mantissa_bits: expected a whole number from 1 to {HALF_BITS}, found {bits}")
+    for name in ("accumulate", "keep"):
+        if not isinstance(config[name], int) or config[name] < 1:
+            raise SystemExit(f"{name}: expected a whole number from 1, found {config[name]}")
     use_threads(options.threads)
+    processes.join(config["device"])
     return config
 
 

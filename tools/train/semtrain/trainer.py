@@ -2,15 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """The loop that all recipes share: Adam, warm-up and decay, EMA, checkpoints that a later run continues, loss curves."""
 import json
+import math
 import signal
 import time
 
 import torch
 
-from . import precision, safetensors_file
+from . import precision, processes, safetensors_file
 from .__main__ import STOPPED
 from .curve import draw_curve
+from .nets.norms import batch_norms
+from .nets.recompute import recompute_blocks
 from .run_folder import CHECKPOINT, LOG, RunFolder
+
+HELD_OUT_STEPS = 8  # of which the held-out loss is the mean: always the same samples and noise
 
 
 def learning_rate(config, step):
@@ -19,35 +24,51 @@ def learning_rate(config, step):
     return config["learning_rate"] * min(1.0, (step + 1) / max(1, config["warmup"]), max(left, 0.0))
 
 
-def generator(config, step, stream=0):
-    """random numbers of a step: a run that is continued draws what one that was not interrupted would"""
-    return torch.Generator().manual_seed((config["seed"] * 1000003 + step) * 16 + stream)
+def parts_of(config):
+    """a batch, divided among processes and then into `accumulate` parts -> those of this process, ranges of samples"""
+    batch, accumulate = config["batch"], config["accumulate"]
+    count = processes.count() * accumulate
+    if batch % count:
+        raise SystemExit(f"batch {batch}: expected a multiple of {count}, {processes.count()} processes times "
+                         f"{accumulate} (accumulate)")
+    size, first = batch // count, processes.rank() * accumulate
+    return [range(i * size, (i + 1) * size) for i in range(first, first + accumulate)]
 
 
-def timesteps_at(shares, count, power):
-    """shares of 0..1, raised to a power -> timesteps below count: with a power above 1 more are low, below 1 fewer"""
-    return (shares ** power * count).long().clamp(max=count - 1)
-
-
-def number_below(n, draw):
-    """0..n - 1, from a generator"""
-    return int(torch.randint(n, (1,), generator=draw))
+def scalar_writer(folder):
+    """TensorBoard's"""
+    try:
+        from torch.utils.tensorboard import SummaryWriter
+    except ImportError as error:
+        raise SystemExit(f"tensorboard=true: {error}; pip install tensorboard") from None
+    return SummaryWriter(folder)
 
 
 class Trainer:
-    """A model and a folder. `config` has steps, learning_rate, warmup, decay, ema, clip, seed, precision (bf16, fp32),
-    device, minutes (0: no limit), save_minutes; `export(state)` writes the engine's files from the averaged weights."""
+    """A model and a folder. `config` has the settings of settings.COMMON, steps, batch and learning_rate;
+    `export(state)` writes the engine's files from the averaged weights. Where several processes train (processes.py)
+    each has one, and that of rank 0 writes."""
 
     def __init__(self, folder, model, config, export):
         self.folder, self.config, self.export = folder, config, export
         self.model = model.to(config["device"])
+        self.parts = parts_of(config)
+        if len(self.parts[0]) < config["batch"] and batch_norms(model):
+            raise SystemExit("this network has batch norms, whose statistics are those of a whole batch: expected one "
+                             "process and accumulate 1")
+        if config["recompute"]:
+            recompute_blocks(self.model)
         self.parameters = dict(self.model.named_parameters())
+        processes.share([p.data for p in self.parameters.values()])  # drawn after a VAE's, where rank 0 needed one
         self.average = {name: p.detach().clone() for name, p in self.parameters.items()}
         self.adam = torch.optim.Adam(self.model.parameters(), lr=config["learning_rate"], betas=(0.9, 0.99))
         self.step = 0
-        self.stopped = False
-        self.place = RunFolder(folder)
-        self.place.keep_settings(config)
+        self.signalled = False
+        with processes.rank_0_first():
+            writes = processes.rank() == 0
+            self.place = RunFolder(folder, alone=writes)
+            self.place.keep_settings(config)
+            self.board = scalar_writer(self.place.file("tensorboard")) if config["tensorboard"] and writes else None
         self._resume()
 
     def start_from(self, state):
@@ -56,36 +77,43 @@ class Trainer:
             self.model.load_state_dict({name: t.float() for name, t in state.items()})
             self.average = {name: p.detach().clone() for name, p in self.parameters.items()}
 
-    def run(self, loss_of_step):
-        """loss_of_step(model, step) -> (loss, {name: number} for the log); until `steps`, `minutes` or a signal, after
-        which the recipe ends with exit code 130"""
+    def run(self, loss_of_step, held_out=None):
+        """loss_of_step(model, step, part) -> (loss, {name: number} for the log) of a part of the step's batch, a range
+        of its samples; until `steps`, `minutes` or a signal, after which the recipe ends with exit code 130.
+        held_out: the same, of data that is not trained on; its loss is logged with every checkpoint"""
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._stop)
         instead = precision.why_not(self.config["precision"], self.config["device"])
         if instead:
             print(instead, flush=True)
+        self._compare()
         begin = saved = reported = time.time()
-        recent = []
-        while self.step < self.config["steps"] and not self.stopped:
+        recent, stopped = [], False
+        while self.step < self.config["steps"] and not stopped:
             recent.append(self._advance(loss_of_step))
             now = time.time()
             if now - reported > 20 or self.step == self.config["steps"]:
                 self._report(recent, (now - reported) / len(recent))
                 recent, reported = [], now
             if now - saved > 60 * self.config["save_minutes"]:
-                self.save()
+                self.save(held_out)
                 saved = time.time()
-            if self.config["minutes"] and now - begin > 60 * self.config["minutes"]:
+            late = self.config["minutes"] and now - begin > 60 * self.config["minutes"]
+            stopped, late = processes.gathered([self.signalled, bool(late)]).any(0).tolist()
+            if late:
                 break
         if recent:
             self._report(recent, (time.time() - reported) / len(recent))
-        self.save()
+        self.save(held_out)
+        processes.leave()
         self.place.release()
-        if self.stopped:
+        if stopped:
             print(f"stopped at step {self.step} of {self.config['steps']}; the same command goes on", flush=True)
             raise SystemExit(STOPPED)
 
-    def save(self):
+    def save(self, held_out=None):
+        if processes.rank() > 0:
+            return
         tensors = {f"model.{name}": p for name, p in self.parameters.items()}
         tensors.update({f"average.{name}": p for name, p in self.average.items()})
         for name, p in self.parameters.items():
@@ -93,19 +121,29 @@ class Trainer:
             if state:
                 tensors[f"adam.exp_avg.{name}"] = state["exp_avg"]
                 tensors[f"adam.exp_avg_sq.{name}"] = state["exp_avg_sq"]
-        safetensors_file.write(self.place.file(CHECKPOINT), tensors, {"step": self.step})
+        self.place.write_checkpoint(tensors, self.step, self.config["keep"])
         self.export({name: p.detach().cpu() for name, p in self.average.items()})
+        if held_out:
+            self._log({"step": self.step, "held_out": self._held_out_loss(held_out)})
         draw_curve(self.place.file(LOG), self.place.file("curve.png"))
 
     def _advance(self, loss_of_step):
+        """one step -> {name: number}, the means over its batch"""
         for group in self.adam.param_groups:
             group["lr"] = learning_rate(self.config, self.step)
-        with precision.autocast(self.config["precision"], self.config["device"]):
-            loss, about = loss_of_step(self.model, self.step)
-        if not torch.isfinite(loss):
-            raise RuntimeError(f"the loss is {loss.item()} at step {self.step}; the last checkpoint is in {self.folder}")
         self.adam.zero_grad(set_to_none=True)
-        loss.backward()
+        rows = []
+        for part in self.parts:
+            with precision.autocast(self.config["precision"], self.config["device"]):
+                loss, about = loss_of_step(self.model, self.step, part)
+            (loss * (len(part) / self.config["batch"])).backward()
+            rows.append({"loss": float(loss.detach()), **about})
+        processes.add_gradients(self.parameters.values())
+        own = [sum(row[name] for row in rows) / len(rows) for name in rows[0]]
+        numbers = dict(zip(rows[0], processes.gathered(own).mean(0).tolist()))
+        if not math.isfinite(numbers["loss"]):
+            raise RuntimeError(f"the loss is {numbers['loss']} at step {self.step}; the last checkpoint is in "
+                               f"{self.folder}")
         torch.nn.utils.clip_grad_norm_(self.model.parameters(), self.config["clip"])
         self.adam.step()
         self.step += 1
@@ -114,14 +152,37 @@ class Trainer:
         with torch.no_grad():
             torch._foreach_mul_([self.average[n] for n in names], keep)
             torch._foreach_add_([self.average[n] for n in names], [self.parameters[n] for n in names], alpha=1 - keep)
-        return {"loss": float(loss.detach()), **about}
+        return numbers
+
+    @torch.no_grad()
+    def _held_out_loss(self, held_out):
+        """of the averaged weights"""
+        own = {name: p.data for name, p in self.parameters.items()}
+        try:
+            for name, p in self.parameters.items():
+                p.data = self.average[name]
+            with precision.autocast(self.config["precision"], self.config["device"]):
+                losses = [float(held_out(self.model, step, None)[0]) for step in range(HELD_OUT_STEPS)]
+        finally:
+            for name, p in self.parameters.items():
+                p.data = own[name]
+        return sum(losses) / len(losses)
 
     def _report(self, recent, seconds):
         row = {"step": self.step, "lr": learning_rate(self.config, self.step - 1), "seconds_per_step": round(seconds, 3)}
         for name in recent[0]:
             row[name] = sum(r[name] for r in recent) / len(recent)
+        self._log(row)
+
+    def _log(self, row):
+        if processes.rank() > 0:
+            return
         with open(self.place.file(LOG), "a") as file:
             file.write(json.dumps(row) + "\n")
+        if self.board:
+            for name in row.keys() - {"step"}:
+                self.board.add_scalar(name, row[name], row["step"])
+            self.board.flush()
         print(" ".join(f"{k} {v:.5g}" for k, v in row.items()), flush=True)
 
     def _resume(self):
@@ -141,5 +202,12 @@ class Trainer:
                         "exp_avg_sq": tensors[f"adam.exp_avg_sq.{name}"].to(p.device)}
         print(f"continuing {self.folder} at step {self.step}", flush=True)
 
+    def _compare(self):
+        """all processes begin with the same weights, also where they read them"""
+        begun = processes.gathered([self.step, sum(float(p.detach().double().sum()) for p in self.parameters.values())])
+        if not (begun == begun[0]).all():
+            raise SystemExit(f"processes begin with different steps or weights: {begun.tolist()}; {self.folder}, "
+                             "--init and the data have to be on a file system that all nodes see")
+
     def _stop(self, *_):
-        self.stopped = True
+        self.signalled = True

@@ -8,7 +8,9 @@ from fnmatch import fnmatchcase
 import torch
 import torch.nn.functional as F
 
+from . import processes
 from .condition import width_of
+from .draws import draws, timesteps_at
 from .grids import Grids, LocalSets
 from .low_rank import add_low_rank, is_adapter, merged, read_adapter
 from .model_folder import add_to_index, read_component, write_component, write_scheduler
@@ -16,7 +18,7 @@ from .nets.transformer import VoxfieldTransformer
 from .prefetch import Prefetched
 from .sampler import linear_alphas
 from .settings import parser, resolve
-from .trainer import Trainer, generator, timesteps_at
+from .trainer import Trainer
 from .usual_objects import usual_objects
 
 
@@ -28,8 +30,8 @@ def weights_of(alphas, gamma):
 
 
 def noised(x0, alphas, t, random):
-    """x0 [B, N, C] at the noise levels t [B]"""
-    noise = torch.randn(x0.shape, generator=random).to(x0.device)
+    """x0 [B, N, C] at the noise levels t [B]; random: Draws"""
+    noise = random.normal(x0.shape[1:]).to(x0.device)
     a = alphas[t][:, None, None]
     return a.sqrt() * x0 + (1 - a).sqrt() * noise
 
@@ -37,17 +39,15 @@ def noised(x0, alphas, t, random):
 def with_known(noisy, x0, known, alphas, top, random):
     """noisy, but voxels that are known [B, N] have the noise of a level below `top` only: what was generated before is a
     little worse than the truth"""
-    if not known.any():
-        return noisy
-    t = torch.randint(0, top, (len(x0),), generator=random).to(x0.device)
+    t = random.below(top).to(x0.device)
     return torch.where(known[..., None], noised(x0, alphas, t, random), noisy)
 
 
 def with_drift(x0, cells, strength, random):
     """tokens x0 [B, N, 6n]; in every other set the colours of the cells [B, N] are off, all by the same. What was
     generated before may have drifted away from its conditions, and must not lead away what comes next"""
-    off = strength * torch.randn((len(x0), 1, 1, 3), generator=random)
-    off *= (torch.rand((len(x0), 1, 1, 1), generator=random) < 0.5)
+    off = strength * random.normal((1, 1, 3))
+    off *= random.uniform((1, 1, 1)) < 0.5
     tokens = x0.unflatten(2, (-1, 6)).clone()
     tokens[..., 3:] += torch.where(cells[..., None, None], off.to(x0.device), 0.0)
     return tokens.flatten(2)
@@ -61,7 +61,7 @@ def noised_sets(x0, known, condition, t, alphas, config, random):
     if config["known_drift"] and "tint" in parts:
         has_tint = condition[..., width_of(parts[:parts.index("tint")])] > 0
         before = with_drift(x0, known & has_tint, config["known_drift"], random)
-    return with_known(noisy, before, known, alphas, config["known_levels"], random)
+    return with_known(noisy, before, known, alphas, config["known_levels"], random) if config["known_share"] else noisy
 
 
 def mean_error(made, x0, target, of_hue=1):
@@ -78,10 +78,10 @@ def loss_of(sets, config):
     alphas, device = linear_alphas(config).to(config["device"]), config["device"]
     weights, of_colors = weights_of(alphas, config["snr_gamma"]), config["color_weight"]
 
-    def loss(model, step):
-        centers, labels, x0, known, condition = (torch.from_numpy(a).to(device) for a in sets.batch(step))
-        random = generator(config, step)
-        t = timesteps_at(torch.rand(len(x0), generator=random), len(alphas), config["timestep_power"]).to(device)
+    def loss(model, step, part=None):
+        centers, labels, x0, known, condition = (torch.from_numpy(a).to(device) for a in sets.batch(step, part))
+        random = draws(config, step, part=part)
+        t = timesteps_at(random.uniform(), len(alphas), config["timestep_power"]).to(device)
         noisy = noised_sets(x0, known, condition, t, alphas, config, random)
         valid = torch.ones(labels.shape, dtype=torch.bool, device=device)
         conditions = (condition,) if condition.shape[-1] else ()
@@ -138,13 +138,23 @@ def exporter(folder, config, grids):
     return export
 
 
+def sets_of(sources, output, cache, config):
+    """LocalSets of grids, which are kept in OUTPUT/CACHE"""
+    with processes.rank_0_first():
+        grids = Grids(sources, os.path.join(output, cache))
+    return LocalSets(grids, config)
+
+
 def main():
     p = parser("transformer", __doc__)
     p.add_argument("--grids", nargs="+", required=True, help=".sgrid files with points, or folders of them")
+    p.add_argument("--held-out", nargs="+", default=[], help="the same, of which the loss is logged alone")
     p.add_argument("--init", help="a voxfield_transformer folder to start from")
     options = p.parse_args()
     config = resolve("transformer", options)
-    sets = LocalSets(Grids(options.grids, os.path.join(options.output, "cache")), config)
+    sets, held = sets_of(options.grids, options.output, "cache", config), None
+    if options.held_out:
+        held = loss_of(sets_of(options.held_out, options.output, "cache_held_out", config), config)
     torch.manual_seed(config["seed"])
     model = VoxfieldTransformer(**config["network"])
     model.start_at_zero()
@@ -155,7 +165,7 @@ def main():
         state, adapter = read_component(options.init)[1], read_adapter(options.init)
         trainer.start_from(with_new_parts({**state, **adapter} if config["low_rank"] else merged(state, adapter), model))
     print(f"{sum(p.numel() for p in model.parameters())} parameters, {len(sets.grids.labels)} cells", flush=True)
-    trainer.run(loss_of(Prefetched(sets, config["workers"]), config))
+    trainer.run(loss_of(Prefetched(sets, config["workers"]), config), held)
 
 
 if __name__ == "__main__":

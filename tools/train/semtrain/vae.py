@@ -16,9 +16,10 @@ import torch
 from torch.nn import functional as F
 
 from . import model_folder, settings
+from .draws import draws, generator, number_below
 from .frames import fill_blocks, find_drives, psnr, to_floats, to_pixels, write_beside
 from .nets.vae import AutoencoderKL
-from .trainer import Trainer, generator, number_below
+from .trainer import Trainer
 
 LIBRARY = {"vae": ["diffusers", "AutoencoderKL"]}
 
@@ -30,8 +31,9 @@ class Pictures:
         self.truths = [drive.truth(n) for drive in drives for n in drive.numbers]
         self.buffers = [drive.buffer(n) for drive in drives for n in drive.numbers]
 
-    def crops(self, config, step):
-        """-> [batch, 3, crop, crop], -1..1; the first round(buffer_share batch) are of buffers"""
+    def crops(self, config, step, part=None):
+        """-> [batch, 3, crop, crop], -1..1; the first round(buffer_share batch) are of buffers. Of `part` alone, a
+        range of the batch"""
         draw = generator(config, step)
         size, out = config["crop"], []
         for i in range(config["batch"]):
@@ -42,7 +44,9 @@ class Pictures:
             top = number_below(picture.shape[1] - size + 1, draw)
             left = number_below(picture.shape[2] - size + 1, draw)
             crop = picture[:, top:top + size, left:left + size]
-            out.append(crop.flip(2) if number_below(2, draw) else crop)
+            crop = crop.flip(2) if number_below(2, draw) else crop
+            if part is None or i in part:
+                out.append(crop)
         return to_floats(torch.stack(out)).contiguous(memory_format=torch.channels_last)
 
 
@@ -74,6 +78,15 @@ def step_loss(model, image, config, noise):
     color = color_loss(made, image)
     loss = rec + config["detail_weight"] * detail + config["color_weight"] * color + config["kl_weight"] * kl
     return loss, {"rec": float(rec), "color": float(color), "kl": float(kl)}
+
+
+def loss_of(pictures, config):
+    def loss(model, step, part=None):
+        image = pictures.crops(config, step, part).to(config["device"])
+        side = config["crop"] // model.downscale
+        noise = draws(config, step, 1, part).normal((config["latent_channels"], side, side))
+        return step_loss(model, image, config, noise.to(config["device"]))
+    return loss
 
 
 def normalize(model, drives):
@@ -158,14 +171,7 @@ def main(arguments=None):
     if state:
         trainer.start_from(state)
 
-    def loss_of_step(network, step):
-        image = pictures.crops(config, step).to(config["device"])
-        side = config["crop"] // network.downscale
-        shape = (config["batch"], config["latent_channels"], side, side)
-        noise = torch.randn(shape, generator=generator(config, step, 1))
-        return step_loss(network, image, config, noise.to(config["device"]))
-
-    trainer.run(loss_of_step)
+    trainer.run(loss_of(pictures, config), loss_of(Pictures(held), config) if held else None)
 
 
 if __name__ == "__main__":

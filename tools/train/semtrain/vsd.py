@@ -13,11 +13,12 @@ import shutil
 import torch
 from torch import nn
 
-from . import model_folder, safetensors_file, settings
+from . import model_folder, processes, safetensors_file, settings
+from .draws import draws, generator, number_below
 from .frames import find_drives, splats_of, to_pixels, write_beside
 from .latents import load_vae, sequences
 from .nets.video_unet import UNetSpatioTemporalConditionModel
-from .trainer import Trainer, generator, number_below
+from .trainer import Trainer
 from .video_denoising import (SCHEDULER, denoise_window, timestep_of, velocity_target, video_input, window_denoiser)
 
 INDEX = {"renderer": ["diffusers", "UNetSpatioTemporalConditionModel"], "scheduler": ["diffusers", SCHEDULER["_class_name"]]}
@@ -59,12 +60,13 @@ class Batches:
         h, w = self.starts[0][0].truth.shape[2:]
         self.crop = (min(config["crop"][0], h), min(config["crop"][1], w))
 
-    def make(self, step):
-        """-> truth, buffer [B, F, 4, h, w], visible [B, F, 1, h, w]"""
+    def make(self, step, part=None):
+        """-> truth, buffer [B, F, 4, h, w], visible [B, F, 1, h, w]; of `part` alone, a range of the batch"""
         draw, rows = generator(self.config, step), []
         for _ in range(self.config["batch"]):
             sequence, i = self.starts[number_below(len(self.starts), draw)]
             rows.append(self._window(sequence, i, draw))
+        rows = rows if part is None else rows[part.start:part.stop]
         return [torch.stack(parts).to(self.config["device"]) for parts in zip(*rows)]
 
     def _window(self, s, i, draw):
@@ -78,17 +80,21 @@ class Batches:
         return s.truth[place], unscaled(s.buffer[place], self.vae_config), visible
 
 
-def step_loss(model, batch, config, draw):
-    """log sigma is normal; -> loss, {eps: the plain error of the velocity at sigma below 1}"""
+def step_loss(model, batch, config, random):
+    """random: Draws; log sigma is normal -> loss, {low: the error of the velocity at sigma below 1}"""
     truth, buffer, visible = batch
-    sigma = torch.exp(config["sigma_mean"] + config["sigma_deviation"] * torch.randn(len(truth), generator=draw))
+    sigma = torch.exp(config["sigma_mean"] + config["sigma_deviation"] * random.normal())
     sigma = sigma.clamp(SCHEDULER["sigma_min"], SCHEDULER["sigma_max"]).to(truth.device)
-    noise = torch.randn(truth.shape, generator=draw).to(truth.device)
+    noise = random.normal(truth.shape[1:]).to(truth.device)
     level = sigma.view(-1, 1, 1, 1, 1)
     made = model(truth + level * noise, buffer, visible, sigma).float()
     error = (made - velocity_target(truth, noise, level)).square().mean((1, 2, 3, 4))
     low = error[sigma < 1]
     return error.mean(), {"low": float(low.mean() if len(low) else error.mean())}
+
+
+def loss_of(batches, config):
+    return lambda model, step, part: step_loss(model, batches.make(step, part), config, draws(config, step, 1, part))
 
 
 class Export:
@@ -156,7 +162,7 @@ def main(arguments=None):
     p = settings.parser("vsd", __doc__.splitlines()[0])
     p.add_argument("--frames", required=True, help="folder of drives (see semtrain/frames.py)")
     p.add_argument("--vae", required=True, help="folder of the VAE, of images or of videos; it stays as it is")
-    p.add_argument("--held-out", help="folder of drives; the first is drawn at each checkpoint")
+    p.add_argument("--held-out", help="folder of drives; each checkpoint logs their loss, and draws of the first")
     p.add_argument("--init", help="model folder to start from: a renderer of videos, or Stable Video Diffusion")
     p.add_argument("--cache", help="folder for the frames' latents; default: OUT/latents")
     options = p.parse_args(arguments)
@@ -166,15 +172,16 @@ def main(arguments=None):
     torch.manual_seed(config["seed"])
     drives = find_drives(options.frames)
     config["defaults"] = splats_of(drives, config["defaults"])
-    batches = Batches(sequences(options.vae, drives, cache, config["mirror"]), config,
-                      load_vae(options.vae).config)
-    held = find_drives(options.held_out)[:1] if options.held_out else []
-    held = (sequences(options.vae, held, cache, False)[0], held[0]) if held else None
+    held, vae_config = find_drives(options.held_out) if options.held_out else [], load_vae(options.vae).config
+    with processes.rank_0_first():
+        batches = Batches(sequences(options.vae, drives, cache, config["mirror"]), config, vae_config)
+        held_out = sequences(options.vae, held, cache, False)
     print(f"{len(batches.starts)} windows of {batches.frames} frames, mirror images counted", flush=True)
-    trainer = Trainer(options.output, Renderer(config), config, Export(options.output, config, options.vae, held))
+    trainer = Trainer(options.output, Renderer(config), config, Export(options.output, config, options.vae,
+                                                                       (held_out[0], held[0]) if held else None))
     if state:
         trainer.start_from(state)
-    trainer.run(lambda m, step: step_loss(m, batches.make(step), config, generator(config, step, 1)))
+    trainer.run(loss_of(batches, config), loss_of(Batches(held_out, config, vae_config), config) if held else None)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ import golden
 from recipe import run_recipe
 from semtrain import adapter, measure_distilled, safetensors_file
 from semtrain.distil import Distillation, Teacher
+from semtrain.draws import Draws
 from semtrain.grids import Grids, LocalSets
 from semtrain.json_file import read_json, write_json
 from semtrain.model_folder import read_component
@@ -158,7 +159,7 @@ class TheRecipe(unittest.TestCase):
         teacher = Teacher(self.teacher, "cpu")
         teacher.model, x = Constant(), torch.randn(2, 5, 24)
         first, known = torch.tensor([0, 2]), torch.zeros(2, 5, dtype=torch.bool)
-        random = torch.Generator().manual_seed(1)
+        random = Draws(torch.Generator().manual_seed(1), 2)
         labels, condition = torch.zeros(2, 5, dtype=torch.long), torch.zeros(2, 5, 0)
         x0 = teacher.x0_of(first, 2, x, known, random, labels, torch.zeros(2, 5, 3), ~known, condition)
         torch.testing.assert_close(x0, torch.full_like(x, 0.3))  # one x0 throughout is that x0

@@ -14,12 +14,12 @@ from PIL import Image
 from recipe import run_recipe
 from semtrain import safetensors_file
 from semtrain.damage import KINDS, gaussian_blur, spoil
+from semtrain.draws import generator
 from semtrain.frames import read_rgb
 from semtrain.inception import Frames, draw_strengths, judge, loss_of, read_network, write_network
 from semtrain.nets.inception import Inception, pool_of, resized
 from semtrain.nets.norms import measure_norms
 from semtrain.program import engine_path
-from semtrain.trainer import generator
 
 SEMROVER = engine_path()
 TINY = {"seed": 1, "device": "cpu", "width": 1 / 32, "least": 4, "crop": 0.6, "clean": 0.25, "twice": 0.25, "batch": 4,

@@ -201,10 +201,11 @@ class ARecipe(unittest.TestCase):
     def run_two_steps(self, **more):
         """-> whether autocast was on, what was printed"""
         config = {"steps": 2, "learning_rate": 0.1, "warmup": 1, "decay": 0, "ema": 0.9, "clip": 1, "precision": "bf16",
-                  "device": "cpu", "minutes": 0, "save_minutes": 10, **more}
+                  "device": "cpu", "minutes": 0, "save_minutes": 10, "batch": 4, "accumulate": 1, "recompute": False,
+                  "keep": 1, "tensorboard": False, **more}
         seen = []
 
-        def loss(model, step):
+        def loss(model, step, _):
             seen.append(torch.is_autocast_cpu_enabled())
             return model(torch.ones(4, 8)).float().square().mean(), {}
         with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()) as said:

@@ -15,10 +15,11 @@ from PIL import Image
 
 from semtrain import asd, measure_frames, model_folder, safetensors_file, vae
 from semtrain.denoising import alphas_cumprod
+from semtrain.draws import draws, generator
 from semtrain.frames import find_drives
 from semtrain.json_file import read_json, write_json
 from semtrain.latents import sequences
-from semtrain.trainer import CHECKPOINT, generator
+from semtrain.trainer import CHECKPOINT
 
 COMMON = {"steps": 4, "learning_rate": 3e-3, "warmup": 1, "decay": 0.0, "ema": 0.5, "precision": "fp32",
           "seed": 1, "device": "cpu"}
@@ -153,7 +154,7 @@ class Recipes(unittest.TestCase):
         model = asd.Renderer(ASD)
 
         def error():
-            return sum(asd.step_loss(model, batches.make(s), alphas_cumprod(), ASD, generator(ASD, s, 1))[1]["eps"]
+            return sum(asd.step_loss(model, batches.make(s), alphas_cumprod(), ASD, draws(ASD, s, 1))[1]["eps"]
                        for s in range(1000, 1008))
         with torch.no_grad():
             before = error()

@@ -13,9 +13,10 @@ import torch
 from PIL import Image
 
 from semtrain import safetensors_file, vae, vsd
+from semtrain.draws import draws
 from semtrain.frames import find_drives
 from semtrain.latents import load_vae, sequences
-from semtrain.trainer import CHECKPOINT, generator
+from semtrain.trainer import CHECKPOINT
 from test_recipes_asd import COMMON, VAE, draw_drive
 
 VSD = {**COMMON, "in_channels": 9, "out_channels": 4, "block_out_channels": [32, 32], "layers_per_block": 1,
@@ -71,7 +72,7 @@ class Recipes(unittest.TestCase):
         model = vsd.Renderer(VSD)
 
         def error():
-            return sum(float(vsd.step_loss(model, batches.make(s), VSD, generator(VSD, s, 1))[0])
+            return sum(float(vsd.step_loss(model, batches.make(s), VSD, draws(VSD, s, 1))[0])
                        for s in range(1000, 1008))
         with torch.no_grad():
             before = error()

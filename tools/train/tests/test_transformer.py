@@ -14,6 +14,7 @@ import torch
 import golden
 from recipe import run_recipe
 from semtrain import safetensors_file, settings
+from semtrain.draws import Draws
 from semtrain.grids import Grids, LocalSets, read_tokens
 from semtrain.known_cells import draw_known
 from semtrain.nets.transformer import CONFIG_FIELDS, VoxfieldTransformer
@@ -80,7 +81,7 @@ class Drift(unittest.TestCase):
         x0 = torch.randn((64, 5, 18))
         cells = torch.zeros((64, 5), dtype=torch.bool)
         cells[:, 1:3] = True
-        off = (with_drift(x0, cells, 0.15, torch.Generator().manual_seed(2)) - x0).unflatten(2, (-1, 6))
+        off = (with_drift(x0, cells, 0.15, Draws(torch.Generator().manual_seed(2), 64)) - x0).unflatten(2, (-1, 6))
         self.assertEqual(float(off[..., :3].abs().max()), 0)
         self.assertEqual(float(off[:, [0, 3, 4]].abs().max()), 0)
         moved = off[:, 1:3, :, 3:]
