@@ -32,11 +32,11 @@ DepthPicture depth_of_gray(const ImageGray16& image, double unit)
 Result<DepthPicture> read_depth_picture(const Path& path, double unit)
 {
     SR_TRY(const MappedFile file, MappedFile::open(path));
-    if (!is_npy(file.bytes())) {
+    if (!is_array(file.bytes())) {
         SR_TRY(const ImageGray16 image, read_png_gray16(path));
         return depth_of_gray(image, unit);
     }
-    SR_TRY(const NpyImage image, decode_npy_image(file.bytes(), quote_path(path)));
+    SR_TRY(const ArrayImage image, decode_array_image(file.bytes(), quote_path(path)));
     DepthPicture depth{image.size.width, image.size.height, {}, image.whole ? unit : kOfFractions};
     depth.pixels.reserve(image.values.size());
     for (const float value : image.values)

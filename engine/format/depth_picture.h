@@ -18,7 +18,7 @@ struct DepthPicture {
 // of 16 bits, of which 65535 are nothing, too
 DepthPicture depth_of_gray(const ImageGray16& image, double unit);
 
-// A PNG of 16-bit gray, or a .npy [height, width]: metres in fractions (not finite, 0 or less: nothing), or whole
+// A PNG of 16-bit gray, or an array (number_image.h): metres in fractions (not finite, 0 or less: nothing), or whole
 // numbers, as the PNG. unit: metres of one of the whole numbers. Errors: bad_input
 Result<DepthPicture> read_depth_picture(const Path& path, double unit);
 

@@ -5,6 +5,12 @@
 #include "engine/format/npy.h"
 #include "runtime/base/quote.h"
 
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <cstring>
+
 namespace semrover {
 
 namespace {
@@ -35,6 +41,46 @@ Result<NpyLayout> npy_layout(std::span<const std::byte> file, std::string_view w
                     file.size() - header.bytes, header.data_bytes);
     const ImageSize size{uint32_t(shape[1]), uint32_t(shape[0])};
     return NpyLayout{std::move(header), size};
+}
+
+// COLMAP's `WIDTH&HEIGHT&CHANNELS&`, then fp32, rows one after the other
+struct ColmapLayout {
+    ImageSize size;
+    size_t header_bytes = 0;
+};
+
+bool is_colmap(std::span<const std::byte> file)
+{
+    constexpr size_t kMostDigits = 20;
+    size_t digits = 0;
+    while (digits < std::min(file.size(), kMostDigits) && std::isdigit(uint8_t(file[digits])))
+        ++digits;
+    return digits > 0 && digits < file.size() && file[digits] == std::byte('&');
+}
+
+Result<ColmapLayout> colmap_layout(std::span<const std::byte> file, std::string_view where)
+{
+    const std::string_view text(reinterpret_cast<const char*>(file.data()), std::min<size_t>(file.size(), 64));
+    std::array<uint64_t, 3> shape{};
+    const char* at = text.data();
+    const char* const end = at + text.size();
+    for (uint64_t& side : shape) {
+        const auto [next, error] = std::from_chars(at, end, side);
+        if (error != std::errc() || next == end || *next != '&')
+            return fail(ErrorCode::bad_input, "{}: expected COLMAP's WIDTH&HEIGHT&CHANNELS& at its beginning", where);
+        at = next + 1;
+    }
+    if (shape[2] != 1)
+        return fail(ErrorCode::bad_input, "{}: a map of {} channels, expected 1: depth", where, shape[2]);
+    for (const uint64_t side : {shape[0], shape[1]})
+        if (side < 1 || side > kMaxImageSide)
+            return fail(ErrorCode::bad_input, "{}: a picture of {} x {} pixels, expected 1 to {} each way", where,
+                        shape[0], shape[1], kMaxImageSide);
+    const ColmapLayout layout{{uint32_t(shape[0]), uint32_t(shape[1])}, size_t(at - text.data())};
+    const uint64_t bytes = shape[0] * shape[1] * sizeof(float), found = file.size() - layout.header_bytes;
+    if (found != bytes)
+        return fail(ErrorCode::bad_input, "{}: {} bytes of pixels, expected {}", where, found, bytes);
+    return layout;
 }
 
 template <typename T>
@@ -96,9 +142,9 @@ Result<LabelImage> numbers_of_png(std::span<const std::byte> file, std::string_v
     return LabelImage{size, label_numbers(std::move(image))};
 }
 
-Result<LabelImage> numbers_of_npy(std::span<const std::byte> file, std::string_view where)
+Result<LabelImage> numbers_of_array(std::span<const std::byte> file, std::string_view where)
 {
-    SR_TRY(const NpyImage image, decode_npy_image(file, where));
+    SR_TRY(const ArrayImage image, decode_array_image(file, where));
     if (!image.whole)
         return fail(ErrorCode::bad_input, "{}: an array of fractions, expected whole class numbers", where);
     LabelImage labels{image.size, {}};
@@ -116,25 +162,36 @@ Result<LabelImage> numbers_of_npy(std::span<const std::byte> file, std::string_v
 
 } // namespace
 
-Result<NpyImage> decode_npy_image(std::span<const std::byte> file, std::string_view where)
+Result<ArrayImage> decode_array_image(std::span<const std::byte> file, std::string_view where)
 {
+    if (is_colmap(file)) {
+        SR_TRY(const ColmapLayout layout, colmap_layout(file, where));
+        ArrayImage image{layout.size, false, std::vector<float>(size_t(layout.size.width) * layout.size.height)};
+        std::memcpy(image.values.data(), file.data() + layout.header_bytes, image.values.size() * sizeof(float));
+        return image;
+    }
     SR_TRY(const NpyLayout layout, npy_layout(file, where));
     const auto data = file.subspan(layout.header.bytes, layout.header.data_bytes);
     const DType type = layout.header.dtype;
     const bool whole = type != DType::f16 && type != DType::f32 && type != DType::f64;
-    return NpyImage{layout.size, whole, npy_floats(decode_npy(layout.header, {data.begin(), data.end()}))};
+    return ArrayImage{layout.size, whole, npy_floats(decode_npy(layout.header, {data.begin(), data.end()}))};
 }
 
-bool is_npy(std::span<const std::byte> file)
+bool is_array(std::span<const std::byte> file)
 {
-    return std::string_view(reinterpret_cast<const char*>(file.data()), file.size()).starts_with("\x93NUMPY");
+    return std::string_view(reinterpret_cast<const char*>(file.data()), file.size()).starts_with("\x93NUMPY") ||
+           is_colmap(file);
 }
 
 Result<ImageSize> number_image_size(const Path& path)
 {
     const std::string where = quote_path(path);
     SR_TRY(const MappedFile file, MappedFile::open(path));
-    if (is_npy(file.bytes())) {
+    if (is_colmap(file.bytes())) {
+        SR_TRY(const ColmapLayout layout, colmap_layout(file.bytes(), where));
+        return layout.size;
+    }
+    if (is_array(file.bytes())) {
         SR_TRY(const NpyLayout layout, npy_layout(file.bytes(), where));
         return layout.size;
     }
@@ -154,8 +211,8 @@ Result<LabelImage> read_label_image(const Path& path)
 {
     const std::string where = quote_path(path);
     SR_TRY(const std::vector<std::byte> file, read_file(path, kMaxLabelBytes));
-    if (is_npy(file))
-        return numbers_of_npy(file, where);
+    if (is_array(file))
+        return numbers_of_array(file, where);
     if (file.size() > 2 && file[0] == std::byte(0xff) && file[1] == std::byte(0xd8))
         return fail(ErrorCode::bad_input, "{}: a JPEG, whose compression changes numbers, expected {}", where,
                     kExpectedNumbers);

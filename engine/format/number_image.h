@@ -6,21 +6,22 @@
 
 namespace semrover {
 
-// a picture of one number a pixel in a .npy file: depth, class numbers
-struct NpyImage {
+// a picture of one number a pixel as an array in a file: depth, class numbers
+struct ArrayImage {
     ImageSize size;
     bool whole = false;        // integers or bool in the file
     std::vector<float> values; // [height, width]; whole numbers are exact up to 2^24
 };
 
-// [height, width], or with an axis of 1 in front or behind; of any type that npy.h reads. What follows the array is
-// not looked at, as in numpy.load. bad_input, with `where` in front; nothing is allocated that the file is too short
-// to fill
-Result<NpyImage> decode_npy_image(std::span<const std::byte> file, std::string_view where);
+// Of a .npy [height, width], or with an axis of 1 in front or behind, of any type that npy.h reads; what follows the
+// array is not looked at, as in numpy.load. Of a depth map of COLMAP's dense reconstruction, fp32.
+// source: COLMAP's scripts/python/read_write_dense.py. bad_input, with `where` in front; nothing is allocated that the
+// file is too short to fill
+Result<ArrayImage> decode_array_image(std::span<const std::byte> file, std::string_view where);
 
-bool is_npy(std::span<const std::byte> file); // by its first bytes
+bool is_array(std::span<const std::byte> file); // either, by its first bytes
 
-// of a .npy picture or a PNG, without its pixels; bad_input
+// of an array or a PNG, without its pixels; bad_input
 Result<ImageSize> number_image_size(const Path& path);
 
 constexpr uint16_t kNoNumber = 65535; // no class is given

@@ -15,9 +15,9 @@ constexpr uint64_t kMaxDepthBytes = 1u << 30;
 constexpr uint32_t kCarlaFar = 0xffffff;
 constexpr double kCarlaMetres = 1000;
 
-Result<DepthImage> depth_of_npy(std::span<const std::byte> file, std::string_view where, const DepthEncoding& e)
+Result<DepthImage> depth_of_array(std::span<const std::byte> file, std::string_view where, const DepthEncoding& e)
 {
-    SR_TRY(NpyImage image, decode_npy_image(file, where));
+    SR_TRY(ArrayImage image, decode_array_image(file, where));
     const auto unit = float(e.unit.value_or(image.whole ? e.usual_unit : 1));
     for (float& d : image.values)
         d = std::isfinite(d) && d > 0 && !(image.whole && d == 65535) ? d * unit : 0;
@@ -83,11 +83,11 @@ Result<DepthImage> read_depth_image(const Path& path, const DepthEncoding& e)
 {
     const std::string where = quote_path(path);
     SR_TRY(const std::vector<std::byte> file, read_file(path, kMaxDepthBytes));
-    if (!is_npy(file))
+    if (!is_array(file))
         return depth_of_png(file, where, e);
     if (e.kind == DepthKind::carla)
-        return fail(ErrorCode::bad_input, "{}: expected CARLA's depth in 8-bit colours, found a .npy", where);
-    return depth_of_npy(file, where, e);
+        return fail(ErrorCode::bad_input, "{}: expected CARLA's depth in 8-bit colours, found an array", where);
+    return depth_of_array(file, where, e);
 }
 
 void make_axial(DepthImage& depth, const Intrinsics& k)

@@ -25,7 +25,7 @@ struct DepthImage {
     DepthKind kind = DepthKind::z;
 };
 
-// A PNG of 16-bit gray (0 and 65535: nothing), CARLA's PNG, or a .npy [height, width] of metres in fractions (not
+// A PNG of 16-bit gray (0 and 65535: nothing), CARLA's PNG, or an array (number_image.h) of metres in fractions (not
 // finite, 0 or less: nothing) or of whole numbers, as the PNG. Errors: bad_input
 Result<DepthImage> read_depth_image(const Path& path, const DepthEncoding& encoding = {});
 

@@ -85,6 +85,9 @@ Result<FramePictures> pictures_of_name(const Path& folder, const CameraFrame& fr
         return is_file(below) ? below : is_file(of_camera) ? of_camera : beside;
     };
     FramePictures p{found("depth"), found("label"), {}};
+    for (const char* kind : {".geometric.bin", ".photometric.bin"}) // of COLMAP's dense reconstruction
+        if (const Path map = folder / kDepthMaps / (relative.string() + kind); !is_file(p.depth) && is_file(map))
+            p.depth = map;
     p.label = optional_picture(p.label);
     for (const Path& color : {picture, folder / "images" / relative, folder / "rgb" / relative, found("color")})
         if (p.color.empty() && is_file(with_ending(color)))

@@ -13,6 +13,7 @@ struct FramePictures {
     Path depth, label, color;
 };
 
+constexpr const char* kDepthMaps = "stereo/depth_maps"; // of a workspace of COLMAP's dense reconstruction
 constexpr std::string_view kPictureEndings[] = {".png", ".jpg", ".jpeg", ".npy"};
 
 // a path of a file, kept inside the folder; bad_input, with `where` in front
