@@ -6,7 +6,7 @@ import os
 import torch
 
 from . import model_folder, safetensors_file
-from .content import digest
+from .content import digest, digest_of_pictures
 from .denoising import block_shares
 from .frames import fill_blocks, to_floats
 from .nets.vae import AutoencoderKL
@@ -54,7 +54,7 @@ def sequences(vae_folder, drives, cache, mirrored=True):
     os.makedirs(cache, exist_ok=True)
     vae, out = None, []
     of_vae = digest([os.path.join(vae_folder, "config.json"), model_folder.weights_of(vae_folder)])
-    contents = [digest(drive.pictures(), f"{of_vae} {drive.numbers}") for drive in drives]
+    contents = [digest_of_pictures(drive.pictures(drive.numbers), f"{of_vae} {drive.numbers}") for drive in drives]
     for flip in (False, True) if mirrored else (False,):
         for drive, content in zip(drives, contents):
             path = os.path.join(cache, f"{content}{'-mirrored' if flip else ''}.safetensors")
