@@ -123,7 +123,7 @@ def nearest(tree, middle, size):
     [size], the nearest first, of equally far ones the lower number"""
     point = tree.data[middle]
     farthest = tree.query(point, [size])[0][0]
-    near = np.array(tree.query_ball_point(point, farthest + 1e-6, return_sorted=True))  # all that are as far as the last
+    near = np.array(tree.query_ball_point(point, farthest + 1e-6, return_sorted=True))  # with all as far as the last
     return near[((tree.data[near] - point) ** 2).sum(1).argsort(kind="stable")[:size]]
 
 
