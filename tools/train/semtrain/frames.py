@@ -64,7 +64,7 @@ class Drive:
 
 def find_drives(root):
     """all drives below root that have frames, sorted by path"""
-    found, drives = pictures_below(root), []
+    found, drives = pictures_below(root, ("color", "visible", "label")), []
     for color in sorted(found, key=lambda path: path.split(os.sep)):
         folder, name = os.path.split(color)
         of_all, camera = os.path.split(folder)

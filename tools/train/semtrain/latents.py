@@ -102,7 +102,9 @@ def sequences(vae_folder, drives, cache, config, mirrored=True):
             if not os.path.exists(path):
                 print(f"encoding {drive.folder} from frame {numbers[0]}{', mirrored' if flip else ''}", flush=True)
                 tensors = encoder.encode(drive, numbers, flip)
-                safetensors_file.write(path, tensors, {"drive": drive.folder, "flip": flip})
+                own = f"{path}.{processes.rank()}"  # the same pictures may be there twice, and be two processes'
+                safetensors_file.write(own, tensors, {"drive": drive.folder, "flip": flip})
+                os.replace(own, path)
         return paths
 
     files = processes.divided(encoded, parts)

@@ -31,15 +31,15 @@ class Picture(NamedTuple):
         return Image.open(io.BytesIO(self.read()))
 
 
-def pictures_below(root):
-    """-> {folder: {number: Picture}} of all folders below root, with links and without hidden ones, that have
-    NNNNNN.png, .jpg or .jpeg. Those of a shard set have the paths that they had in the folder. A number in two formats
-    is refused."""
+def pictures_below(root, kinds):
+    """-> {folder: {number: Picture}} of all folders below root with one of these names, with links and without hidden
+    ones, that have NNNNNN.png, .jpg or .jpeg. Those of a shard set have the paths that they had in the folder. A number
+    in two formats is refused."""
     found = {}
 
     def put(folder, name, picture):
         named = re.fullmatch(r"([0-9]+)\.(png|jpg|jpeg)", name)
-        if not named:
+        if not named or os.path.basename(folder) not in kinds:
             return
         pictures, number = found.setdefault(folder, {}), int(named[1])
         if number in pictures:
