@@ -12,11 +12,11 @@ import shutil
 import torch
 from torch import nn
 
-from . import model_folder, processes, safetensors_file, settings
+from . import model_folder, safetensors_file, settings
 from .denoising import alphas_cumprod, ddim_timesteps, denoise, input_of, noise_of, scheduler_of
 from .draws import draws, generator, number_below, timesteps_at
 from .frames import find_drives, splats_of, to_pixels, write_beside
-from .latents import load_vae, sequences
+from .latents import crop_of, load_vae, sequences
 from .nets.unet import UNet2DConditionModel
 from .trainer import Trainer
 
@@ -43,8 +43,7 @@ class Batches:
     def __init__(self, all_sequences, config):
         self.config = config
         self.frames = [(s, i) for s in all_sequences for i in range(len(s))]
-        h, w = self.frames[0][0].truth.shape[2:]
-        self.crop = (min(config["crop"][0], h), min(config["crop"][1], w))
+        self.crop = crop_of(config, all_sequences)
 
     def make(self, step, part=None):
         """-> truth, previous (with noise on it, or zeros), buffer [B, 4, h, w], visible [B, 1, h, w]; of `part` alone,
@@ -129,13 +128,14 @@ class Export:
     def _draw(self, model):
         """buffer | drawn as a first frame | truth"""
         s, drive = self.held
-        i, vae = len(s) // 2, load_vae(self.vae_folder)
-        noise = torch.randn(s.truth[i:i + 1].shape, generator=torch.Generator().manual_seed(1))
+        i, device = len(s) // 2, self.config["device"]
+        model, vae = model.to(device), load_vae(self.vae_folder).to(device)
+        noise = torch.randn(s.truth[i:i + 1].shape, generator=torch.Generator().manual_seed(1)).to(device)
         steps, scale = self.config["defaults"]["num_inference_steps"], self.config["defaults"]["guidance_scale"]
-        made = denoise(model.unet, model.text, noise, torch.zeros_like(noise), s.buffer[i:i + 1], s.visible[i:i + 1],
-                       steps, scale, scheduler_of(self.config))
+        made = denoise(model.unet, model.text, noise, torch.zeros_like(noise), s.buffer[i:i + 1].to(device),
+                       s.visible[i:i + 1].to(device), steps, scale, scheduler_of(self.config))
         truth = drive.truth(drive.numbers[i])
-        picture = to_pixels(vae.decode_scaled(made))[0, :, :truth.shape[1], :truth.shape[2]]
+        picture = to_pixels(vae.decode_scaled(made)).cpu()[0, :, :truth.shape[1], :truth.shape[2]]
         write_beside(os.path.join(self.folder, "held_out.png"), [drive.buffer(drive.numbers[i]), picture, truth])
 
 
@@ -174,9 +174,8 @@ def main(arguments=None):
     drives = find_drives(options.frames)
     config["defaults"] = splats_of(drives, config["defaults"])
     held = find_drives(options.held_out) if options.held_out else []
-    with processes.rank_0_first():
-        batches = Batches(sequences(options.vae, drives, cache, config["mirror"]), config)
-        held_out = sequences(options.vae, held, cache, False)
+    batches = Batches(sequences(options.vae, drives, cache, config, config["mirror"]), config)
+    held_out = sequences(options.vae, held, cache, config, mirrored=False)
     print(f"{len(batches.frames)} frames, mirror images counted", flush=True)
     model = Renderer(config).to(memory_format=torch.channels_last)
     trainer = Trainer(options.output, model, config, Export(options.output, config, options.vae,

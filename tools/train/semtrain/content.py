@@ -7,6 +7,14 @@ import os
 from .json_file import read_json, write_json
 
 
+def digest_of_pictures(pictures, about=""):
+    """as `digest`, of Pictures, which may lie in archives: the same as of files with their bytes"""
+    total = hashlib.sha256(about.encode())
+    for picture in pictures:
+        total.update(hashlib.sha256(picture.read()).digest())
+    return total.hexdigest()[:24]
+
+
 def digest(paths, about=""):
     """of files, in this order, and of what else a kept thing depends on; one that is not there counts as empty"""
     total = hashlib.sha256(about.encode())

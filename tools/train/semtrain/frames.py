@@ -3,11 +3,14 @@
 """Frames of drives: what the renderer knows (splat buffer, visibility) and what it should draw (the shaded truth).
 
 A drive is a folder anywhere below the root, its frames numbered in the order in which they were driven:
-    color/000000.png            the truth, RGB
-    buffer/color/000000.png     splats over black, RGB
+    color/000000.png            the truth, RGB; .jpg and .jpeg, too
+    buffer/color/000000.png     splats over black, RGB; likewise
     buffer/visible/000000.png   grey: 0 where there is no splat
+    label/000000.png            class numbers, for `inception` alone
     buffer/splats.json          how large the splats were, {"splat_radius": "auto" or metres}; `run drives` writes it
-`semrover streets --images` writes the first, `semrover render GRID --path transforms.json -o buffer` the others.
+`semrover streets --images` writes the first and the labels, `semrover render GRID --path transforms.json -o buffer` the
+others. Of a rig each camera is a drive: CAMERA/color, CAMERA/label, buffer/CAMERA/color, buffer/CAMERA/visible. Any of
+these folders may be in a shard set.
 """
 import os
 
@@ -16,8 +19,8 @@ import torch
 from PIL import Image
 
 from .json_file import read_json
+from .pictures import pictures_below
 
-PARTS = ("color", "buffer/color", "buffer/visible")
 SPLATS = "buffer/splats.json"
 
 
@@ -26,51 +29,68 @@ def picture_name(number):
 
 
 class Drive:
-    """A folder as above; a frame that lacks one of the three pictures is left out, and begins a new sequence."""
+    """One as above, or one camera's; a frame that lacks one of the three pictures is left out, and begins a new
+    sequence. The arguments are {number: Picture}, and the folder that has splats.json"""
 
-    def __init__(self, folder):
-        self.folder = folder
-        found = [set(_numbers(os.path.join(folder, part))) for part in PARTS]
-        self.numbers = sorted(set.intersection(*found))
+    def __init__(self, folder, truths, buffers, visible, labels, of_buffers):
+        self.folder, self.parts, self.labels, self.of_buffers = folder, (truths, buffers, visible), labels, of_buffers
+        self.numbers = sorted(set(truths) & set(buffers) & set(visible))
 
     def truth(self, number):
         """-> uint8 [3, H, W]"""
-        return read_rgb(os.path.join(self.folder, "color", picture_name(number)))
+        return read_rgb(self.parts[0][number])
 
     def buffer(self, number):
         """-> uint8 [3, H, W]"""
-        return read_rgb(os.path.join(self.folder, "buffer", "color", picture_name(number)))
+        return read_rgb(self.parts[1][number])
 
     def visible(self, number):
         """-> float [1, H, W], 0 or 1"""
-        with Image.open(os.path.join(self.folder, "buffer", "visible", picture_name(number))) as image:
+        with self.parts[2][number].open() as image:
             return torch.from_numpy(np.array(image.convert("L")) != 0).float()[None]
 
     def has_previous(self, number):
-        return number - 1 in self.numbers
+        return all(number - 1 in part for part in self.parts)
 
-    def pictures(self):
-        """the files of all frames"""
-        return [os.path.join(self.folder, part, picture_name(n)) for part in PARTS for n in self.numbers]
+    def pictures(self, numbers):
+        """the Pictures of these frames"""
+        return [part[n] for part in self.parts for n in numbers]
 
     def splat_radius(self):
         """of the buffers: "auto", metres, or None where nothing says it"""
-        path = os.path.join(self.folder, SPLATS)
+        path = os.path.join(self.of_buffers, os.path.basename(SPLATS))
         return read_json(path)["splat_radius"] if os.path.exists(path) else None
 
 
 def find_drives(root):
     """all drives below root that have frames, sorted by path"""
-    drives = []
-    for folder, folders, _ in os.walk(root, followlinks=True):
-        folders[:] = sorted(name for name in folders if not name.startswith("."))
-        if "color" in folders and os.path.isdir(os.path.join(folder, "buffer", "color")):
-            drive = Drive(folder)
-            if drive.numbers:
-                drives.append(drive)
+    found, drives = pictures_below(root, ("color", "visible", "label")), []
+    for color in sorted(found, key=lambda path: path.split(os.sep)):
+        folder, name = os.path.split(color)
+        of_all, camera = os.path.split(folder)
+        for of_buffers, inner in ((os.path.join(folder, "buffer"), ""), (os.path.join(of_all, "buffer"), camera)):
+            buffers, visible = (found.get(os.path.join(of_buffers, inner, part)) for part in ("color", "visible"))
+            if name == "color" and buffers and visible:
+                labels = found.get(os.path.join(folder, "label"), {})
+                drives.append(Drive(folder, found[color], buffers, visible, labels, of_buffers))
+                break
+    drives = [drive for drive in drives if drive.numbers]
     if not drives:
         raise SystemExit(f"{root}: no frames; expected color/, buffer/color/ and buffer/visible/ with 000000.png, ... "
-                         "in some folder (make them with tools/train/run drives)")
+                         "in some folder (make them with tools/train/run drives), or CAMERA/color/, "
+                         "buffer/CAMERA/color/ and buffer/CAMERA/visible/")
+    return drives
+
+
+def find_made_drives(root):
+    """those of find_drives, which have to be as `run drives` writes them: PNG in folders, of one camera"""
+    drives = find_drives(root)
+    for drive in drives:
+        for part, name in zip(drive.parts, ("color", "buffer/color", "buffer/visible")):
+            for number in drive.numbers:
+                path = os.path.join(drive.folder, name, picture_name(number))
+                if part[number].file != path:
+                    raise SystemExit(f"expected {path}, as `run drives` writes it, found {part[number].file}")
     return drives
 
 
@@ -91,9 +111,9 @@ def splats_of(drives, defaults):
     return {**defaults, "splat_radius": radius}
 
 
-def read_rgb(path):
-    """-> uint8 [3, H, W]"""
-    with Image.open(path) as image:
+def read_rgb(picture):
+    """of a Picture -> uint8 [3, H, W]"""
+    with picture.open() as image:
         return torch.from_numpy(np.array(image.convert("RGB"))).permute(2, 0, 1).contiguous()
 
 
@@ -123,9 +143,3 @@ def psnr(a, b):
 def write_beside(path, pictures):
     """uint8 [3, H, W] each, side by side"""
     Image.fromarray(torch.cat(pictures, 2).permute(1, 2, 0).contiguous().numpy()).save(path)
-
-
-def _numbers(folder):
-    if not os.path.isdir(folder):
-        return []
-    return [int(name[:-4]) for name in os.listdir(folder) if name.endswith(".png") and name[:-4].isdecimal()]

@@ -5,6 +5,7 @@ import glob
 import os
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from . import safetensors_file
 from .condition import drawn_boxes, drawn_tints, mirrored, given_boxes, given_parts, given_tints, vector_of, width_of
@@ -117,13 +118,22 @@ class Grids:
         return sums
 
 
+def nearest(tree, middle, size):
+    """numbers of the `size` points of a tree, whose coordinates are whole, that are nearest to point `middle`: i64
+    [size], the nearest first, of equally far ones the lower number"""
+    point = tree.data[middle]
+    farthest = tree.query(point, [size])[0][0]
+    near = np.array(tree.query_ball_point(point, farthest + 1e-6, return_sorted=True))  # with all as far as the last
+    return near[((tree.data[near] - point) ** 2).sum(1).argsort(kind="stable")[:size]]
+
+
 class LocalSets:
     """Batches of sets of neighbouring voxels: the `size` voxels that are nearest to one that is drawn."""
 
     def __init__(self, grids, config):
         self.grids, self.config = grids, config
         self.sums = grids.balance(config["class_balance"])
-        self.near = [np.array(grids.cells[a:b], np.float32) for a, b in zip(grids.offsets, grids.offsets[1:])]
+        self.trees = [cKDTree(grids.cells[a:b]) for a, b in zip(grids.offsets, grids.offsets[1:])]
 
     def batch(self, step, part=None):
         """of one size: centers [B, N, 3] metres, labels [B, N], tokens [B, N, 6n], known [B, N], conditions [B, N, W];
@@ -133,7 +143,7 @@ class LocalSets:
         part = range(c["batch"]) if part is None else part
         random = np.random.default_rng([c["seed"], step])
         size = int(random.integers(c["set_size"][0], c["set_size"][1] + 1))
-        size = min(size, min(len(n) for n in self.near))
+        size = min(size, min(tree.n for tree in self.trees))
         drawn = [self._draw(random, size) for _ in range(c["batch"])]
         sets = [self._set(size, *drawn[i]) for i in part]
         centers, labels, tokens, cells, boxes, part_boxes = (np.stack(of_sets) for of_sets in zip(*sets))
@@ -181,18 +191,16 @@ class LocalSets:
 
     def _draw(self, random, size):
         """of a set: which grid, where in its sums, whether x and y are turned over, an order of its points or None"""
-        grid, place = int(random.integers(len(self.near))), random.random()
+        grid, place = int(random.integers(len(self.trees))), random.random()
         turned = [self.config["mirror"] and random.random() < 0.5 for _ in range(2)]
         points = (size, self.grids.tokens.shape[1] // 6)
         return grid, place, turned, None if self.config["ordered_points"] else random.random(points).argsort(1)
 
     def _set(self, size, g, place, turned, order):
         """-> centers, labels, tokens, which voxels of the grids these are, and the boxes of their objects and parts"""
-        cells, first = self.near[g], self.grids.offsets[g]
-        middle = min(int(np.searchsorted(self.sums[g], place)), len(cells) - 1)
-        apart = ((cells - cells[middle]) ** 2).sum(1)
-        chosen = np.argpartition(apart, size - 1)[:size]
-        centers = (cells[chosen].astype(np.float64) + 0.5) * self.config["network"]["voxel_size"]
+        tree, first = self.trees[g], self.grids.offsets[g]
+        chosen = nearest(tree, min(int(np.searchsorted(self.sums[g], place)), tree.n - 1), size)
+        centers = (tree.data[chosen] + 0.5) * self.config["network"]["voxel_size"]
         tokens = self.grids.tokens[first + chosen].astype(np.float32).reshape(size, -1, 6)
         boxes, part_boxes = (of[numbers[first + chosen]] if len(of) else np.ones((size, 7))
                              for of, numbers in ((self.grids.boxes, self.grids.owners),

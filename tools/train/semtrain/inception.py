@@ -11,14 +11,13 @@ import os
 
 import numpy as np
 import torch
-from PIL import Image
 from torch import nn
 from torch.nn import functional as F
 
 from . import safetensors_file, settings
 from .damage import KINDS, LEAST, spoil
 from .draws import generator, number_below
-from .frames import find_drives, picture_name
+from .frames import find_drives
 from .json_file import write_json
 from .nets.inception import Inception, resized
 from .nets.norms import averaged
@@ -36,9 +35,8 @@ class Frames:
         self.frames = []
         for drive in find_drives(root):
             for number in drive.numbers:
-                labels = os.path.join(drive.folder, "label", picture_name(number))
-                if os.path.exists(labels):
-                    self.frames.append((drive.truth(number), drive.buffer(number), read_labels(labels)))
+                if number in drive.labels:
+                    self.frames.append((drive.truth(number), drive.buffer(number), read_labels(drive.labels[number])))
         if not self.frames:
             raise SystemExit(f"{root}: no frame has label/000000.png, ...; `semrover streets --images` writes them")
 
@@ -66,9 +64,9 @@ class Frames:
         return images, torch.stack(shares), torch.stack(strengths)
 
 
-def read_labels(path):
-    """-> uint8 [H, W], 20 for nothing"""
-    with Image.open(path) as image:
+def read_labels(picture):
+    """of a Picture -> uint8 [H, W], 20 for nothing"""
+    with picture.open() as image:
         return torch.from_numpy(np.array(image.convert("L"))).clamp(max=CLASSES)
 
 

@@ -1,16 +1,21 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Latents of drives, encoded once by a trained VAE and kept in a folder."""
+"""Latents of drives, encoded once by a trained VAE, and kept in a folder in files of up to FRAMES frames: what a kill
+costs, and what one of several processes encodes at a time. They are mapped to memory, not read into it."""
 import os
+from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
 
 import torch
 
-from . import model_folder, safetensors_file
-from .content import digest
+from . import model_folder, processes, safetensors_file
+from .content import digest, digest_of_pictures
 from .denoising import block_shares
 from .frames import fill_blocks, to_floats
 from .nets.vae import AutoencoderKL
 from .nets.video_vae import AutoencoderKLTemporalDecoder
+
+FRAMES = 64  # of a file: 9 MB of 616 x 424
 
 
 def load_vae(folder):
@@ -22,44 +27,92 @@ def load_vae(folder):
     return vae.eval().requires_grad_(False)
 
 
+class Joined:
+    """tensors [FRAMES, ...], of which the last may be shorter, as one [F, ...]. Frames are copied when they are asked
+    for, by number or by a range [i:j], as fp32"""
+
+    def __init__(self, tensors):
+        self.tensors = tensors
+        self.shape = (sum(map(len, tensors)), *tensors[0].shape[1:])
+
+    def __getitem__(self, which):
+        if isinstance(which, slice):
+            return torch.stack([self[i] for i in range(*which.indices(self.shape[0]))])
+        return self.tensors[which // FRAMES][which % FRAMES].float()
+
+
 class Sequence:
     """a drive as the denoiser sees it: truth, buffer [F, 4, h, w], visible [F, 1, h, w], first [F]: nothing before"""
 
-    def __init__(self, tensors):
-        self.truth, self.buffer, self.visible = (tensors[n].float() for n in ("truth", "buffer", "visible"))
-        self.first = tensors["first"].bool().tolist()
+    def __init__(self, files, first):
+        """files: {name: tensor} of FRAMES frames each, the last one of what is left"""
+        self.truth, self.buffer, self.visible = (Joined([f[n] for f in files]) for n in ("truth", "buffer", "visible"))
+        self.first = first
 
     def __len__(self):
         return len(self.first)
 
 
-@torch.no_grad()
-def encode_drive(vae, drive, flip):
-    """-> {truth, buffer, visible, first} of a drive, or of its mirror image"""
-    rows = {"truth": [], "buffer": [], "visible": []}
-    for number in drive.numbers:
-        pictures = {"truth": to_floats(drive.truth(number)), "buffer": to_floats(drive.buffer(number)),
-                    "visible": drive.visible(number)}
-        for name, picture in pictures.items():
-            filled = fill_blocks(picture[None], vae.downscale)  # before it is mirrored: blocks begin at the left
-            filled = filled.flip(3) if flip else filled
-            rows[name].append(block_shares(filled, vae.downscale) if name == "visible" else vae.encode_scaled(filled))
-    out = {name: torch.cat(values) for name, values in rows.items()}
-    out["first"] = torch.tensor([not drive.has_previous(n) for n in drive.numbers], dtype=torch.uint8)
-    return out
+def crop_of(config, all_sequences):
+    """height and width of what a step trains on: config's, or less where a drive's latents are smaller"""
+    return tuple(min(most, *(s.truth.shape[axis] for s in all_sequences)) for axis, most in zip((2, 3), config["crop"]))
 
 
-def sequences(vae_folder, drives, cache, mirrored=True):
-    """-> [Sequence] of the drives, then of their mirror images; what `cache` does not hold yet is encoded"""
+class Encoder:
+    """of a vae folder, which is loaded when it is first needed; random numbers stay as they were"""
+
+    def __init__(self, folder, device, batch):
+        self.folder, self.device, self.batch, self.vae = folder, device, batch, None
+
+    @torch.no_grad()
+    def encode(self, drive, numbers, flip):
+        """-> {truth, buffer, visible} of frames of a drive, or of their mirror images"""
+        if not self.vae:
+            with torch.random.fork_rng(devices=[]):
+                self.vae = load_vae(self.folder).to(self.device)
+        rows = {"truth": [], "buffer": [], "visible": []}
+        with ThreadPoolExecutor(4) as pool:  # reads while the device encodes
+            frames = pool.map(lambda n: (drive.truth(n), drive.buffer(n), drive.visible(n)), numbers)
+            for _ in range(0, len(numbers), self.batch):
+                batch = [torch.stack(part) for part in zip(*islice(frames, self.batch))]
+                for name, pictures in zip(rows, batch):
+                    rows[name].append(self._encode(name, pictures.to(self.device), flip).cpu())
+        return {name: torch.cat(values) for name, values in rows.items()}
+
+    def _encode(self, name, pictures, flip):
+        pictures = pictures if name == "visible" else to_floats(pictures)
+        filled = fill_blocks(pictures, self.vae.downscale)  # before it is mirrored: blocks begin at the left
+        filled = filled.flip(3) if flip else filled
+        return block_shares(filled, self.vae.downscale) if name == "visible" else self.vae.encode_scaled(filled)
+
+
+def sequences(vae_folder, drives, cache, config, mirrored=True):
+    """-> [Sequence] of the drives, then of their mirror images. What `cache` does not hold yet is encoded on config's
+    device, `encode_batch` frames at a time, by all processes, which all call this"""
     os.makedirs(cache, exist_ok=True)
-    vae, out = None, []
     of_vae = digest([os.path.join(vae_folder, "config.json"), model_folder.weights_of(vae_folder)])
-    contents = [digest(drive.pictures(), f"{of_vae} {drive.numbers}") for drive in drives]
-    for flip in (False, True) if mirrored else (False,):
-        for drive, content in zip(drives, contents):
-            path = os.path.join(cache, f"{content}{'-mirrored' if flip else ''}.safetensors")
+    encoder = Encoder(vae_folder, config["device"], config["encode_batch"])
+    parts = [(drive, drive.numbers[i:i + FRAMES]) for drive in drives for i in range(0, len(drive.numbers), FRAMES)]
+
+    def encoded(part):
+        drive, numbers, flips = *part, (False, True) if mirrored else (False,)
+        content = digest_of_pictures(drive.pictures(numbers), f"{of_vae} {numbers}")
+        paths = [os.path.join(cache, f"{content}{'-mirrored' if flip else ''}.safetensors") for flip in flips]
+        for path, flip in zip(paths, flips):
             if not os.path.exists(path):
-                vae = vae or load_vae(vae_folder)
-                safetensors_file.write(path, encode_drive(vae, drive, flip), {"drive": drive.folder, "flip": flip})
-            out.append(Sequence(safetensors_file.read(path)))
+                print(f"encoding {drive.folder} from frame {numbers[0]}{', mirrored' if flip else ''}", flush=True)
+                tensors = encoder.encode(drive, numbers, flip)
+                own = f"{path}.{processes.rank()}"  # the same pictures may be there twice, and be two processes'
+                safetensors_file.write(own, tensors, {"drive": drive.folder, "flip": flip})
+                os.replace(own, path)
+        return paths
+
+    files = processes.divided(encoded, parts)
+    out = []
+    for flipped in zip(*files):
+        left = iter(flipped)
+        for drive in drives:
+            count = -(-len(drive.numbers) // FRAMES)
+            out.append(Sequence([safetensors_file.read(next(left), mapped=True) for _ in range(count)],
+                                [not drive.has_previous(n) for n in drive.numbers]))
     return out

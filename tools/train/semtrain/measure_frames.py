@@ -9,8 +9,8 @@ import json
 import os
 import shutil
 
-from .content import digest, digest_of_folder, keep_made_of
-from .frames import find_drives, picture_name
+from .content import digest, digest_of_folder, digest_of_pictures, keep_made_of
+from .frames import find_made_drives, picture_name
 from .json_file import read_json, write_json
 from .program import semrover
 
@@ -42,7 +42,7 @@ def gather(source, target, numbers):
 def poses_of(root, output):
     """-> [Pose]: seen, and shifted where there are such drives"""
     kinds = {"seen": {}, "shifted": {}}
-    for drive in find_drives(root):
+    for drive in find_made_drives(root):
         name = os.path.relpath(drive.folder, root)
         kind = "shifted" if os.path.basename(name) == BESIDE else "seen"
         kinds[kind][name.split(os.sep)[0]] = drive
@@ -127,7 +127,8 @@ def main(arguments=None):
     options = p.parse_args(arguments)
     keep_made_of(options.output, {
         "model": digest_of_folder(options.model), "steps": options.steps, "frame_noise": options.frame_noise,
-        "frames": digest([path for drive in find_drives(options.frames) for path in drive.pictures()]),
+        "frames": digest_of_pictures([picture for drive in find_made_drives(options.frames)
+                                      for picture in drive.pictures(drive.numbers)]),
         "features": options.features and digest([options.features])})
     lines = ["| poses | frames | PSNR dB | where splats are | SSIM | KID x 1000 | flicker | truth's |", "|" + "---|" * 8]
     for pose in poses_of(options.frames, options.output):

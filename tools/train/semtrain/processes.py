@@ -11,7 +11,7 @@ import sys
 import torch
 from torch import distributed
 
-PATIENCE = datetime.timedelta(hours=12)  # for rank 0, which may encode all frames before the first step
+PATIENCE = datetime.timedelta(hours=12)  # for rank 0, which may make the cache of all grids before the first step
 SMALL = 1 << 18  # numbers of a gradient
 
 
@@ -91,6 +91,25 @@ def add_gradients(parameters):
         done.wait()
     for g, part in zip(small, together.split([g.numel() for g in small]) if small else []):
         g.copy_(part.view(g.shape))
+
+
+def divided(work, items):
+    """[work(item)] of all items, in every process. Each does one in turn, and waits for the others; all end if one
+    fails"""
+    done = []
+    for first in range(0, len(items), count()):
+        own, of_all = None, [None] * count()
+        try:
+            own = [work(item) for item in items[first:first + count()][rank():rank() + 1]]
+        finally:
+            if count() > 1:
+                distributed.all_gather_object(of_all, own)
+            else:
+                of_all = [own]
+        if None in of_all:
+            raise SystemExit(1)
+        done += [result for results in of_all for result in results]
+    return done
 
 
 @contextlib.contextmanager

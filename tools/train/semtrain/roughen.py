@@ -12,7 +12,7 @@ import torch
 from . import safetensors_file
 from .content import digest_of_folder, keep_made_of
 from .drives import make_buffers
-from .frames import find_drives
+from .frames import find_made_drives
 from .regenerate import load_transformer, regenerate
 
 
@@ -68,7 +68,7 @@ def main():
     def is_left(drive):
         return not os.path.exists(os.path.join(options.output, name_of(drive), "buffer", "color"))
 
-    left = filter(is_left, find_drives(options.frames))
+    left = filter(is_left, find_made_drives(options.frames))
     for seed, drives in itertools.groupby(left, lambda drive: name_of(drive).split(os.sep)[0]):
         grid = os.path.join(options.output, seed + ".sgrid")  # for all drives of the street
         write_rough(os.path.join(options.streets, seed, "truth.sgrid"), grid, int(seed), transformer)

@@ -14,7 +14,7 @@ LOG = "log.jsonl"
 SETTINGS = "config.json"
 # nothing that has been learnt
 MAY_CHANGE = ("steps", "minutes", "save_minutes", "device", "workers", "mantissa_bits", "defaults", "accumulate",
-              "recompute", "keep", "tensorboard")
+              "recompute", "keep", "tensorboard", "encode_batch")
 
 
 class RunFolder:

@@ -30,17 +30,19 @@ def read_header(path):
     return header, metadata, 8 + length
 
 
-def read(path, names=None):
-    """-> {name: torch tensor}, all or those named; copies"""
+def read(path, names=None, mapped=False):
+    """-> {name: torch tensor}, all or those named; copies, or mapped to memory: read from the file when looked at"""
     header, _, start = read_header(path)
-    data = np.memmap(path, np.uint8, "r")
+    data = np.memmap(path, np.uint8, "c")
     tensors = {}
     for name, about in header.items():
         if names is not None and name not in names:
             continue
         first, last = about["data_offsets"]
-        raw = torch.from_numpy(np.array(data[start + first:start + last]))
-        tensors[name] = raw.view(_TORCH[about["dtype"]]).reshape(about["shape"])
+        raw, dtype = data[start + first:start + last], _TORCH[about["dtype"]]
+        aligned = raw.ctypes.data % torch.empty((), dtype=dtype).element_size() == 0
+        raw = torch.from_numpy(raw if mapped and aligned else np.array(raw))
+        tensors[name] = raw.view(dtype).reshape(about["shape"])
     return tensors
 
 

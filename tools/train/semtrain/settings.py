@@ -11,9 +11,11 @@ from . import processes
 from .model_folder import HALF_BITS
 
 CONFIGS = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "configs")
-COMMON = {"seed": 1, "precision": "bf16", "device": "cuda" if torch.cuda.is_available() else "cpu", "minutes": 0.0,
+DEVICE = "cuda" if torch.cuda.is_available() else "cpu"
+COMMON = {"seed": 1, "precision": "bf16", "device": DEVICE, "minutes": 0.0,
           "save_minutes": 10.0, "workers": 0, "warmup": 200, "decay": 0.3, "ema": 0.999, "clip": 1.0,
-          "mantissa_bits": HALF_BITS, "accumulate": 1, "recompute": False, "keep": 1, "tensorboard": False}
+          "mantissa_bits": HALF_BITS, "accumulate": 1, "recompute": False, "keep": 1, "tensorboard": False,
+          "encode_batch": 8 if DEVICE == "cuda" else 1}  # a CPU spends more than it saves on the memory of larger ones
 
 
 def parser(recipe, about):
@@ -44,7 +46,7 @@ def resolve(recipe, options):
     bits = config["mantissa_bits"]
     if not isinstance(bits, int) or bits not in range(1, HALF_BITS + 1):
         raise SystemExit(f"mantissa_bits: expected a whole number from 1 to {HALF_BITS}, found {bits}")
-    for name in ("accumulate", "keep"):
+    for name in ("accumulate", "keep", "encode_batch"):
         if not isinstance(config[name], int) or config[name] < 1:
             raise SystemExit(f"{name}: expected a whole number from 1, found {config[name]}")
     use_threads(options.threads)

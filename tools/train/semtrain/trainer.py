@@ -59,7 +59,7 @@ class Trainer:
         if config["recompute"]:
             recompute_blocks(self.model)
         self.parameters = dict(self.model.named_parameters())
-        processes.share([p.data for p in self.parameters.values()])  # drawn after a VAE's, where rank 0 needed one
+        processes.share([p.data for p in self.parameters.values()])  # CPUs of other kinds may draw others
         self.average = {name: p.detach().clone() for name, p in self.parameters.items()}
         self.adam = torch.optim.Adam(self.model.parameters(), lr=config["learning_rate"], betas=(0.9, 0.99))
         self.step = 0

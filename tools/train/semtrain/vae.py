@@ -103,6 +103,7 @@ def measure(model, drives, picture):
     for drive in drives:
         truth = drive.truth(drive.numbers[len(drive.numbers) // 2])
         made = to_pixels(model.decode(model.moments(_filled(truth, model))[0])[0, :, :truth.shape[1], :truth.shape[2]])
+        made = made.cpu()
         values.append(psnr(truth, made))
         if len(values) == 1:
             write_beside(picture, [truth, made])
@@ -129,6 +130,7 @@ class Export:
         model = AutoencoderKL(self.config).eval()
         state = {**state, **self.frozen}
         model.load_state_dict(state)
+        model.to(self.config["device"])
         if not self.frozen:
             normalize(model, self.drives)
         model_folder.write_component(os.path.join(self.folder, "vae"), model.config_json(), state,
@@ -142,6 +144,8 @@ class Export:
 
 
 def _filled(picture, model):
+    """on the device of the model"""
+    picture = picture.to(next(model.parameters()).device)
     return fill_blocks(to_floats(picture)[None], model.downscale)
 
 

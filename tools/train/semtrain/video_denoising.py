@@ -57,7 +57,7 @@ def denoise_window(clean, noise, steps, known=None, correlation=0.9):
     """Euler's steps over one window. clean(x, sigma) -> clean latents in the state; noise [F, ...]; known [K, ...]: of
     the first frames, which are held: at every level they are what they are plus the noise that they began with. What
     `clean` says wrongly of them corrects what it says of the others; a correlation of 0 leaves that out"""
-    sigmas = karras_sigmas(steps)
+    sigmas = karras_sigmas(steps).to(noise.device)
     held = 0 if known is None else len(known)
 
     def corrected(x, sigma):
@@ -77,7 +77,7 @@ def denoise_window(clean, noise, steps, known=None, correlation=0.9):
 
 def window_denoiser(unet, text, added, buffer, visible, first, last):
     """-> clean(x, sigma) for denoise_window; buffer [F, 4, h, w], not scaled; visible [F, 1, h, w]"""
-    guidance = guidance_of(len(buffer), first, last)
+    guidance = guidance_of(len(buffer), first, last).to(buffer.device)
 
     def clean(x, sigma):
         def made(seen):

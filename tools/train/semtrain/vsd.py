@@ -13,10 +13,10 @@ import shutil
 import torch
 from torch import nn
 
-from . import model_folder, processes, safetensors_file, settings
+from . import model_folder, safetensors_file, settings
 from .draws import draws, generator, number_below
 from .frames import find_drives, splats_of, to_pixels, write_beside
-from .latents import load_vae, sequences
+from .latents import crop_of, load_vae, sequences
 from .nets.video_unet import UNetSpatioTemporalConditionModel
 from .trainer import Trainer
 from .video_denoising import (SCHEDULER, denoise_window, timestep_of, velocity_target, video_input, window_denoiser)
@@ -57,8 +57,7 @@ class Batches:
                        if not any(s.first[i + 1:i + self.frames])]
         if not self.starts:
             raise SystemExit(f"no drive has {self.frames} frames in a row; --set num_frames=N takes shorter windows")
-        h, w = self.starts[0][0].truth.shape[2:]
-        self.crop = (min(config["crop"][0], h), min(config["crop"][1], w))
+        self.crop = crop_of(config, all_sequences)
 
     def make(self, step, part=None):
         """-> truth, buffer [B, F, 4, h, w], visible [B, F, 1, h, w]; of `part` alone, a range of the batch"""
@@ -72,12 +71,11 @@ class Batches:
     def _window(self, s, i, draw):
         top = number_below(s.truth.shape[2] - self.crop[0] + 1, draw)
         left = number_below(s.truth.shape[3] - self.crop[1] + 1, draw)
-        place = (slice(i, i + self.frames), slice(None), slice(top, top + self.crop[0]),
-                 slice(left, left + self.crop[1]))
-        visible = s.visible[place]
+        place = (..., slice(top, top + self.crop[0]), slice(left, left + self.crop[1]))
+        truth, buffer, visible = (of[i:i + self.frames][place] for of in (s.truth, s.buffer, s.visible))
         if float(torch.rand(1, generator=draw)) < self.config["dropout"]:
             visible = torch.zeros_like(visible)
-        return s.truth[place], unscaled(s.buffer[place], self.vae_config), visible
+        return truth, unscaled(buffer, self.vae_config), visible
 
 
 def step_loss(model, batch, config, random):
@@ -124,11 +122,13 @@ class Export:
     def _draw(self, model):
         """buffer | drawn | truth, of the first and the last frame of a window"""
         s, drive = self.held
-        count, vae, d = min(self.config["num_frames"], len(s)), load_vae(self.vae_folder), self.config["defaults"]
-        noise = torch.randn(s.truth[:count].shape, generator=torch.Generator().manual_seed(1))
-        clean = window_denoiser(model.unet, model.text, model.numbers(), unscaled(s.buffer[:count], vae.config),
-                                s.visible[:count], d["first_guidance_scale"], d["guidance_scale"])
-        pictures = to_pixels(vae.decode_scaled(denoise_window(clean, noise, d["num_inference_steps"])))
+        count, device, d = min(self.config["num_frames"], len(s)), self.config["device"], self.config["defaults"]
+        model, vae = model.to(device), load_vae(self.vae_folder).to(device)
+        noise = torch.randn(s.truth[:count].shape, generator=torch.Generator().manual_seed(1)).to(device)
+        clean = window_denoiser(model.unet, model.text, model.numbers(),
+                                unscaled(s.buffer[:count], vae.config).to(device), s.visible[:count].to(device),
+                                d["first_guidance_scale"], d["guidance_scale"])
+        pictures = to_pixels(vae.decode_scaled(denoise_window(clean, noise, d["num_inference_steps"]))).cpu()
         for i in (0, count - 1):
             number = drive.numbers[i]
             truth = drive.truth(number)
@@ -173,9 +173,8 @@ def main(arguments=None):
     drives = find_drives(options.frames)
     config["defaults"] = splats_of(drives, config["defaults"])
     held, vae_config = find_drives(options.held_out) if options.held_out else [], load_vae(options.vae).config
-    with processes.rank_0_first():
-        batches = Batches(sequences(options.vae, drives, cache, config["mirror"]), config, vae_config)
-        held_out = sequences(options.vae, held, cache, False)
+    batches = Batches(sequences(options.vae, drives, cache, config, config["mirror"]), config, vae_config)
+    held_out = sequences(options.vae, held, cache, config, mirrored=False)
     print(f"{len(batches.starts)} windows of {batches.frames} frames, mirror images counted", flush=True)
     trainer = Trainer(options.output, Renderer(config), config, Export(options.output, config, options.vae,
                                                                        (held_out[0], held[0]) if held else None))

@@ -133,7 +133,7 @@ class Train(OnAMachine):
 
     def test_says_what_is_missing(self):
         for arguments, environment, line in (
-                ([], {"PYTHON": self.program("without", "exit 1\n")}, ".*without has no torch and numpy"),
+                ([], {"PYTHON": self.program("without", "exit 1\n")}, ".*without has no torch, numpy and scipy"),
                 ([], {"PYTHON": self.path("none")}, "needs .*/none: install Python 3"),
                 ([], {"BUILD": self.path("none")}, "no .*/none/semrover: build it here, or unpack"),
                 (["--grids", "x"], {}, "--grids and --held come together"),

@@ -16,6 +16,7 @@ from semtrain import safetensors_file
 from semtrain.damage import KINDS, gaussian_blur, spoil
 from semtrain.draws import generator
 from semtrain.frames import read_rgb
+from semtrain.pictures import Picture
 from semtrain.inception import Frames, draw_strengths, judge, loss_of, read_network, write_network
 from semtrain.nets.inception import Inception, pool_of, resized
 from semtrain.nets.norms import measure_norms
@@ -233,7 +234,7 @@ class TheRecipe(unittest.TestCase):
         network = random_network()
         write_drive(self.path("large"), size=(310, 460), seed=3)  # one set is enlarged, the other made smaller
         sets = [[self.path(f"{drive}/color/{n:06d}.png") for n in range(2)] for drive in ("drives/a", "large")]
-        sets = [torch.stack([read_rgb(path) for path in paths]) for paths in sets]
+        sets = [torch.stack([read_rgb(Picture(path)) for path in paths]) for paths in sets]
         write_network(self.path("net.safetensors"), network)
         exact = read_network(self.path("net.safetensors"), TINY).double()
         subprocess.run([SEMROVER, "eval", "fid", self.path("drives/a/color"), self.path("large/color"), "--features",

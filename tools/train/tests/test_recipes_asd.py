@@ -22,7 +22,7 @@ from semtrain.latents import sequences
 from semtrain.trainer import CHECKPOINT
 
 COMMON = {"steps": 4, "learning_rate": 3e-3, "warmup": 1, "decay": 0.0, "ema": 0.5, "precision": "fp32",
-          "seed": 1, "device": "cpu"}
+          "seed": 1, "device": "cpu", "encode_batch": 2}
 VAE = {**COMMON, "latent_channels": 4, "block_out_channels": [8, 8, 16, 16], "layers_per_block": 1,
        "norm_num_groups": 4, "mid_block_add_attention": False, "use_quant_conv": False, "use_post_quant_conv": False,
        "force_upcast": False, "crop": 32, "batch": 4, "buffer_share": 0.25, "detail_weight": 1.0, "color_weight": 1.0,
@@ -139,7 +139,7 @@ class Recipes(unittest.TestCase):
 
     def test_latents_have_mean_zero_and_deviation_one(self):
         drives = find_drives(self.path("frames"))
-        all_sequences = sequences(self.path("of_vae", "vae"), drives, self.path("measured"))
+        all_sequences = sequences(self.path("of_vae", "vae"), drives, self.path("measured"), ASD)
         self.assertEqual(len(all_sequences), 4)
         self.assertEqual(all_sequences[0].first, [True, False, False])
         first = torch.cat([s.truth[:1].flatten() for s in all_sequences[:2]])
@@ -149,7 +149,7 @@ class Recipes(unittest.TestCase):
     def test_asd_learns_what_it_sees(self):
         self.train_asd("learned", "--set", "steps=80")
         batches = asd.Batches(sequences(self.path("of_vae", "vae"), find_drives(self.path("frames")),
-                                        self.path("learned", "latents")), ASD)
+                                        self.path("learned", "latents"), ASD), ASD)
         torch.manual_seed(1)
         model = asd.Renderer(ASD)
 
@@ -173,7 +173,7 @@ class Recipes(unittest.TestCase):
     def test_a_batch_hides_previous_and_visibility_together(self):
         config = {**ASD, "batch": 64}
         batches = asd.Batches(sequences(self.path("of_vae", "vae"), find_drives(self.path("frames")),
-                                        self.path("measured")), config)
+                                        self.path("measured"), config), config)
         _, previous, buffer, visible = batches.make(0)
         hidden = visible.flatten(1).abs().sum(1) == 0
         self.assertEqual(float(previous[hidden].abs().max()), 0)

@@ -62,7 +62,8 @@ class Recipes(unittest.TestCase):
         return safetensors_file.read(self.path(output, CHECKPOINT))
 
     def batches(self, **changes):
-        all_sequences = sequences(self.path("of_vae", "vae"), find_drives(self.path("frames")), self.path("measured"))
+        all_sequences = sequences(self.path("of_vae", "vae"), find_drives(self.path("frames")), self.path("measured"),
+                                  VSD)
         return vsd.Batches(all_sequences, {**VSD, **changes}, load_vae(self.path("of_vae", "vae")).config)
 
     def test_it_learns_what_it_sees(self):
@@ -85,7 +86,8 @@ class Recipes(unittest.TestCase):
         hidden = visible.flatten(1).abs().sum(1) == 0
         self.assertTrue(0.15 < hidden.float().mean() < 0.45)
         self.assertGreater(float(buffer[hidden].abs().min(0).values.max()), 0)
-        all_sequences = sequences(self.path("of_vae", "vae"), find_drives(self.path("frames")), self.path("measured"))
+        all_sequences = sequences(self.path("of_vae", "vae"), find_drives(self.path("frames")), self.path("measured"),
+                                  VSD)
         self.assertEqual(len(self.batches(num_frames=2).starts), 2 * len(all_sequences))
         all_sequences[0].first[1] = True  # a frame is missing in front of it
         whole = vsd.Batches(all_sequences, {**VSD, "num_frames": 2}, {"scaling_factor": 1.0})

@@ -226,7 +226,8 @@ class ARun(InAFolder):
         torch.manual_seed(1)
         autoencoder = vae.AutoencoderKL(VAE)
         model_folder.write_component(self.path("vae"), autoencoder.config_json(), autoencoder.state_dict())
-        draw_drive(self.path("frames"), 1)
+        for i in range(2):
+            draw_drive(self.path("frames", str(i)), i)
         write_json(self.path("asd.json"), ASD)
 
         def train(folder, *more):
@@ -238,6 +239,15 @@ class ARun(InAFolder):
             (code, out), other = self.finish(self.start(self.two(), "two", train=train))
         self.assertEqual((code, other), (0, (0, "")), out)
         self.assert_equal(self.state("two")[0], self.state("parts")[0])
+        encoded = [safetensors_file.read(self.path(folder, "latents", name)) for folder in ("parts", "two")
+                   for name in sorted(os.listdir(self.path(folder, "latents")))]
+        self.assertEqual(len(encoded), 2 * 4)
+        for one, both in zip(encoded[:4], encoded[4:]):
+            self.assert_equal(both, one)
+        with open(self.path("frames", "1", "color", "000001.png"), "r+b") as file:
+            file.truncate(60)
+        (code, out), (other, more) = self.finish(self.start(self.two(), "broken", train=train))
+        self.assertEqual((code, other), (1, 1), out + more)  # which one of them read it
 
     def test_is_started_by_torchrun(self):
         torchrun = ["-m", "torch.distributed.run", "--standalone", "--nproc_per_node=2", "--no_python",
@@ -346,8 +356,8 @@ class AStep(InAFolder):
 
     def test_of_the_renderers_and_the_vae_is_what_its_parts_come_to(self):
         torch.manual_seed(1)
-        drive = latents.Sequence({"truth": torch.randn(4, 4, 8, 8), "buffer": torch.randn(4, 4, 8, 8),
-                                  "visible": torch.rand(4, 1, 8, 8), "first": torch.tensor([1, 0, 0, 0])})
+        drive = latents.Sequence([{"truth": torch.randn(4, 4, 8, 8), "buffer": torch.randn(4, 4, 8, 8),
+                                   "visible": torch.rand(4, 1, 8, 8)}], [True, False, False, False])
         self.check(asd.Renderer(ASD), asd.loss_of(asd.Batches([drive], ASD), ASD), 4)
         self.check(vsd.Renderer(VSD), vsd.loss_of(vsd.Batches([drive], VSD, {"scaling_factor": 0.5}), VSD), 2)
         draw_drive(self.path("frames"), 1)

@@ -10,12 +10,13 @@ import unittest
 
 import numpy as np
 import torch
+from scipy.spatial import cKDTree
 
 import golden
 from recipe import run_recipe
 from semtrain import safetensors_file, settings
 from semtrain.draws import Draws
-from semtrain.grids import Grids, LocalSets, read_tokens
+from semtrain.grids import Grids, LocalSets, nearest, read_tokens
 from semtrain.known_cells import draw_known
 from semtrain.nets.transformer import CONFIG_FIELDS, VoxfieldTransformer
 from semtrain.program import semrover_path
@@ -125,6 +126,16 @@ class TheRecipe(unittest.TestCase):
         expected = np.broadcast_to(lattice.float() / 0.3, tokens[..., :3].shape)
         np.testing.assert_allclose(tokens[..., :3], expected, atol=1e-3)
         self.assertEqual(len(np.unique(tokens[..., 3], axis=0)), 4)  # the colours are where the mirrors brought them
+
+    def test_neighbours_are_those_of_a_search_over_all_voxels(self):
+        random = np.random.default_rng(1)
+        cells = np.unique(random.integers(-9, 9, (1500, 3)), axis=0)
+        cells = random.permutation(cells)  # so that numbers say nothing of places
+        tree = cKDTree(cells)
+        for middle, size in zip(random.integers(0, len(cells), 40), [1, 2, len(cells), *random.integers(3, 300, 37)]):
+            apart = ((cells - cells[middle]) ** 2).sum(1)
+            expected = np.lexsort((np.arange(len(cells)), apart))[:size]
+            self.assertEqual(nearest(tree, middle, size).tolist(), expected.tolist())
 
     def test_draws_sets_of_neighbours_and_drops_the_labels_of_some(self):
         config = {"seed": 3, "set_size": [8, 12], "batch": 64, "label_dropout": 0.25, "class_balance": 0.5,
