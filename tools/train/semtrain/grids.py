@@ -144,7 +144,7 @@ class LocalSets:
         random = np.random.default_rng([c["seed"], step])
         size = int(random.integers(c["set_size"][0], c["set_size"][1] + 1))
         size = min(size, min(tree.n for tree in self.trees))
-        drawn = [self._draw(random, size) for _ in range(c["batch"])]
+        drawn = [self._draw(self._example(random), size) for _ in range(c["batch"])]
         sets = [self._set(size, *drawn[i]) for i in part]
         centers, labels, tokens, cells, boxes, part_boxes = (np.stack(of_sets) for of_sets in zip(*sets))
         labels = labels.astype(np.int64)
@@ -156,6 +156,11 @@ class LocalSets:
         conditions = np.stack([self._condition(np.random.default_rng([c["seed"], step, i]), *of_set)
                                for i, of_set in zip(part, zip(centers, cells, boxes, part_boxes, tokens, dropped))])
         return centers, labels, tokens, np.stack(known[part.start:]), conditions
+
+    def _example(self, random):
+        """random numbers of a set: of one of `examples`, where that is not 0"""
+        count = self.config.get("examples", 0)
+        return np.random.default_rng([self.config["seed"], 0, 0, int(random.integers(count))]) if count else random
 
     def _condition(self, random, centers, cells, boxes, part_boxes, tokens, dropped):
         """what a set is conditioned on beside its labels; where these are dropped, nothing. With all colours given,

@@ -14,6 +14,7 @@ CONFIGS = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 DEVICE = "cuda" if torch.cuda.is_available() else "cpu"
 COMMON = {"seed": 1, "precision": "bf16", "device": DEVICE, "minutes": 0.0,
           "save_minutes": 10.0, "workers": 0, "warmup": 200, "decay": 0.3, "ema": 0.999, "clip": 1.0,
+          "betas": [0.9, 0.99], "examples": 0,
           "mantissa_bits": HALF_BITS, "accumulate": 1, "recompute": False, "keep": 1, "tensorboard": False,
           "encode_batch": 8 if DEVICE == "cuda" else 1}  # a CPU spends more than it saves on the memory of larger ones
 

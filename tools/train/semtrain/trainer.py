@@ -61,7 +61,7 @@ class Trainer:
         self.parameters = dict(self.model.named_parameters())
         processes.share([p.data for p in self.parameters.values()])  # CPUs of other kinds may draw others
         self.average = {name: p.detach().clone() for name, p in self.parameters.items()}
-        self.adam = torch.optim.Adam(self.model.parameters(), lr=config["learning_rate"], betas=(0.9, 0.99))
+        self.adam = torch.optim.Adam(self.model.parameters(), lr=config["learning_rate"], betas=config["betas"])
         self.step = 0
         self.signalled = False
         with processes.rank_0_first():

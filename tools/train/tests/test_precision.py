@@ -200,9 +200,9 @@ class EachOp(unittest.TestCase):
 class ARecipe(unittest.TestCase):
     def run_two_steps(self, **more):
         """-> whether autocast was on, what was printed"""
-        config = {"steps": 2, "learning_rate": 0.1, "warmup": 1, "decay": 0, "ema": 0.9, "clip": 1, "precision": "bf16",
-                  "device": "cpu", "minutes": 0, "save_minutes": 10, "batch": 4, "accumulate": 1, "recompute": False,
-                  "keep": 1, "tensorboard": False, **more}
+        config = {"steps": 2, "learning_rate": 0.1, "warmup": 1, "decay": 0, "ema": 0.9, "clip": 1,
+                  "betas": (0.9, 0.99), "precision": "bf16", "device": "cpu", "minutes": 0, "save_minutes": 10,
+                  "batch": 4, "accumulate": 1, "recompute": False, "keep": 1, "tensorboard": False, **more}
         seen = []
 
         def loss(model, step, _):

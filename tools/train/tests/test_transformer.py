@@ -153,6 +153,15 @@ class TheRecipe(unittest.TestCase):
         again = sets.batch(5)
         self.assertTrue((again[2] == tokens).all())
 
+    def test_has_as_many_sets_as_its_config_says(self):
+        def first_tokens(**more):
+            config = {"seed": 3, "set_size": [8, 8], "batch": 16, "label_dropout": 0, "class_balance": 0, "mirror": True,
+                      "ordered_points": False, "known_share": 0, "network": {"num_classes": 20, "voxel_size": 0.6}, **more}
+            sets = LocalSets(Grids([self.grid], self.path("cache")), config)
+            return {sets.batch(step)[2][i].tobytes() for step in range(8) for i in range(16)}
+        self.assertEqual(len(first_tokens(examples=5)), 5)
+        self.assertGreater(len(first_tokens()), 100)
+
     def test_gives_a_part_of_some_sets_and_leaves_it_out_of_the_loss(self):
         words = ["-o", self.path("unused"), "--config", "small", *TINY, "--set", "set_size=[20,20]", "--set", "batch=64",
                  "--set", "known_share=0.5", "--set", "snr_gamma=0"]
