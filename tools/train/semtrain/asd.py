@@ -12,7 +12,7 @@ import shutil
 import torch
 from torch import nn
 
-from . import model_folder, safetensors_file, settings
+from . import empty_prompt, model_folder, safetensors_file, settings
 from .denoising import alphas_cumprod, ddim_timesteps, denoise, input_of, noise_of, scheduler_of
 from .draws import draws, generator, number_below, timesteps_at
 from .frames import find_drives, splats_of, to_pixels, write_beside
@@ -153,9 +153,13 @@ def read_init(folder, config):
     path = os.path.join(folder, "conditioning", "conditioning.safetensors")
     if os.path.exists(path):
         out["text"] = safetensors_file.read(path)["encoder_hidden_states"].float()
-        config["text_tokens"] = out["text"].shape[1]
+    elif empty_prompt.has_encoder(folder):
+        out["text"] = empty_prompt.embedding_of(folder)
     else:
         out["text"] = torch.zeros(1, config["text_tokens"], config["cross_attention_dim"])
+    config["text_tokens"], width = out["text"].shape[1:]
+    if width != config["cross_attention_dim"]:
+        raise SystemExit(f"{folder}: the text has {width} channels, the UNet expects {config['cross_attention_dim']}")
     return out
 
 

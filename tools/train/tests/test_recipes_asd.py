@@ -5,6 +5,7 @@ import contextlib
 import io
 import json
 import os
+import shutil
 import subprocess
 import tempfile
 import unittest
@@ -13,13 +14,14 @@ import numpy as np
 import torch
 from PIL import Image
 
-from semtrain import asd, measure_frames, model_folder, safetensors_file, vae
+from semtrain import asd, empty_prompt, measure_frames, model_folder, safetensors_file, vae
 from semtrain.denoising import alphas_cumprod
 from semtrain.draws import draws, generator
 from semtrain.frames import find_drives
 from semtrain.json_file import read_json, write_json
 from semtrain.latents import sequences
 from semtrain.trainer import CHECKPOINT
+from test_empty_prompt import write_text_encoder
 
 COMMON = {"steps": 4, "learning_rate": 3e-3, "warmup": 1, "decay": 0.0, "ema": 0.5, "precision": "fp32",
           "seed": 1, "device": "cpu", "encode_batch": 2}
@@ -208,6 +210,16 @@ class Recipes(unittest.TestCase):
         self.assertEqual(tuple(wide.shape), (16, 13, 3, 3))
         self.assertTrue(torch.equal(wide[:, :4], narrow["conv_in.weight"].float()))
         self.assertEqual(float(wide[:, 4:].abs().max()), 0)
+        shutil.rmtree(self.path("plain", "conditioning"))
+        width = config["cross_attention_dim"]
+        self.assertEqual(float(asd.read_init(self.path("plain"), config)["text"].abs().max()), 0)
+        write_text_encoder(self.path("plain"), width)
+        text = asd.read_init(self.path("plain"), config)["text"]
+        self.assertTrue(torch.equal(text, empty_prompt.embedding_of(self.path("plain"))))
+        self.assertEqual(config["text_tokens"], text.shape[1])
+        write_text_encoder(self.path("plain"), width + 8)
+        with self.assertRaisesRegex(SystemExit, f"the text has {width + 8} channels, the UNet expects {width}"):
+            asd.read_init(self.path("plain"), config)
 
     def test_the_engine_loads_the_folder_and_draws_a_frame_with_it(self):
         self.train_asd("model", "--held-out", self.path("frames"))
