@@ -15,6 +15,15 @@ namespace semrover {
 
 namespace {
 
+Result<ImageSize> image_size(uint64_t width, uint64_t height, std::string_view where)
+{
+    for (const uint64_t side : {width, height})
+        if (side < 1 || side > kMaxImageSide)
+            return fail(ErrorCode::bad_input, "{}: a picture of {} x {} pixels, expected 1 to {} each way", where,
+                        width, height, kMaxImageSide);
+    return ImageSize{uint32_t(width), uint32_t(height)};
+}
+
 struct NpyLayout {
     NpyHeader header;
     ImageSize size;
@@ -32,14 +41,10 @@ Result<NpyLayout> npy_layout(std::span<const std::byte> file, std::string_view w
     if (shape.size() != 2)
         return fail(ErrorCode::bad_input, "{}: an array of shape ({}), expected [height, width]", where,
                     fmt::join(header.shape, ", "));
-    for (const uint64_t side : shape)
-        if (side < 1 || side > kMaxImageSide)
-            return fail(ErrorCode::bad_input, "{}: a picture of {} x {} pixels, expected 1 to {} each way", where,
-                        shape[1], shape[0], kMaxImageSide);
+    SR_TRY(const ImageSize size, image_size(shape[1], shape[0], where));
     if (header.data_bytes > file.size() - header.bytes)
         return fail(ErrorCode::bad_input, "{}: the file is cut: {} bytes of pixels, expected {}", where,
                     file.size() - header.bytes, header.data_bytes);
-    const ImageSize size{uint32_t(shape[1]), uint32_t(shape[0])};
     return NpyLayout{std::move(header), size};
 }
 
@@ -72,11 +77,8 @@ Result<ColmapLayout> colmap_layout(std::span<const std::byte> file, std::string_
     }
     if (shape[2] != 1)
         return fail(ErrorCode::bad_input, "{}: a map of {} channels, expected 1: depth", where, shape[2]);
-    for (const uint64_t side : {shape[0], shape[1]})
-        if (side < 1 || side > kMaxImageSide)
-            return fail(ErrorCode::bad_input, "{}: a picture of {} x {} pixels, expected 1 to {} each way", where,
-                        shape[0], shape[1], kMaxImageSide);
-    const ColmapLayout layout{{uint32_t(shape[0]), uint32_t(shape[1])}, size_t(at - text.data())};
+    SR_TRY(const ImageSize size, image_size(shape[0], shape[1], where));
+    const ColmapLayout layout{size, size_t(at - text.data())};
     const uint64_t bytes = shape[0] * shape[1] * sizeof(float), found = file.size() - layout.header_bytes;
     if (found != bytes)
         return fail(ErrorCode::bad_input, "{}: {} bytes of pixels, expected {}", where, found, bytes);

@@ -90,9 +90,10 @@ Path first_picture(const Path& folder, std::initializer_list<const char*> kinds)
 Result<ImageSize> first_depth_size(const Path& folder)
 {
     Path picture = first_picture(folder, {"depth"});
-    for (const Path& map : list_tree(folder / kDepthMaps).value_or(std::vector<Path>()))
-        if (picture.empty() && map.extension() == ".bin")
-            picture = map;
+    if (picture.empty())
+        for (const Path& map : list_tree(folder / kDepthMaps).value_or(std::vector<Path>()))
+            if (picture.empty() && map.extension() == ".bin")
+                picture = map;
     if (picture.empty())
         return fail(ErrorCode::bad_input, "{}: no depth/*.png or depth/*.npy, expected 16-bit gray pictures there",
                     quote_path(folder));
