@@ -39,9 +39,11 @@ static void open_world(visitor* self)
     CHECK_OK(self->context, sr_world_focus(self->world, position, forward, 6));
 }
 
+/* a piece at a time: where a tile's splats find room, and so which of two that are exactly equally far is blended first,
+ * goes by which of those before were shown already */
 static void step(visitor* self)
 {
-    CHECK_OK(self->context, sr_world_step(self->world, 5000, &self->done));
+    CHECK_OK(self->context, sr_world_step(self->world, 0, &self->done));
 }
 
 /* what an application asks between steps */

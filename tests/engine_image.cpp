@@ -484,7 +484,7 @@ TEST(Image, pictures_that_hold_no_depth_are_refused_by_name)
                      "found colour of 8 bits"));
     EXPECT_TRUE(says(depth(PngFile{1, 1, 16, PngFile::kGray, "\x05\x06", ""}.bytes(), DepthKind::carla),
                      "expected CARLA's depth in 8-bit colours, found gray of 16 bits"));
-    EXPECT_TRUE(says(depth(npy(DType::f32, {1, 1}, std::vector<float>{1}), DepthKind::carla), "found a .npy"));
+    EXPECT_TRUE(says(depth(npy(DType::f32, {1, 1}, std::vector<float>{1}), DepthKind::carla), "found an array"));
 }
 
 TEST(engine_image, depth_has_the_unit_of_its_file_and_of_fractions_its_own)
