@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "engine/camera/lens.h"
 #include "engine/fusion/depth_frames.h"
 #include "engine/scene/palette.h"
 
@@ -66,26 +67,38 @@ class StreetScene {
         return std::ranges::min_element(shapes, {}, [&](const Shape& s) { return std::abs(s.distance(p)); })->label;
     }
 
+    struct Seen {
+        double metres = std::numeric_limits<double>::infinity(); // in lengths of the ray
+        uint8_t label = 10;
+    };
+    Seen along(const Point3& from, const Point3& ray) const
+    {
+        Seen seen;
+        for (const Shape& s : shapes)
+            if (const double t = s.hit(from, ray); t < seen.metres)
+                seen = {t, s.label};
+        return seen;
+    }
+
+    // depth as the camera's lens has it
     DepthImages render(const CameraFrame& frame) const
     {
         const Intrinsics& k = frame.intrinsics;
+        const Lens lens(k);
         const Rigid camera_to_world = frame.pose.camera_to_world();
         const Point3 from = translation_of(camera_to_world);
         DepthImages images;
         for (uint32_t y = 0; y < k.height; ++y)
             for (uint32_t x = 0; x < k.width; ++x) {
-                const Point3 ahead = transform(camera_to_world, {(x + 0.5 - k.cx) / k.fx, (y + 0.5 - k.cy) / k.fy, 1});
+                const auto own = lens.ray(x + 0.5, y + 0.5);
+                const Point3 ahead = transform(camera_to_world, own.value_or(Point3{}));
                 const Point3 ray = {ahead[0] - from[0], ahead[1] - from[1], ahead[2] - from[2]};
-                double depth = kNone;
-                uint8_t label = 10;
-                for (const Shape& s : shapes)
-                    if (const double t = s.hit(from, ray); t < depth) {
-                        depth = t;
-                        label = s.label;
-                    }
+                const Seen seen = own ? along(from, ray) : Seen();
+                const double depth = own ? seen.metres * lens.depth(*own) : kNone;
                 images.depth.push_back(depth < 65 ? float(std::lround(depth * 1000)) * 0.001f : 0.f);
-                images.labels.push_back(label);
-                images.colors.insert(images.colors.end(), kPalette[label].color.begin(), kPalette[label].color.end());
+                images.labels.push_back(seen.label);
+                images.colors.insert(images.colors.end(), kPalette[seen.label].color.begin(),
+                                     kPalette[seen.label].color.end());
             }
         return images;
     }

@@ -226,13 +226,13 @@ class NuscenesScene {
     {
         PointCounts counts;
         for (const size_t moment : drive_.lidar.there() ? keys_ : std::vector<size_t>()) {
-            const LidarScans::Scan& scan = drive_.lidar.scans[moment];
+            const RecordedSweep& scan = drive_.lidar.scans[moment];
             SR_TRY(const auto points, read_scan(scan.points));
             for (const Track& track : tracks) {
                 const auto place = std::ranges::find(track.places, moment, &Track::Place::moment);
                 if (place == track.places.end() || !nuscenes_category(track.label))
                     continue;
-                const Rigid to_box = compose(inverse(place->pose), scan.sensor_to_world);
+                const Rigid to_box = compose(inverse(place->pose), scan.to_world);
                 counts[{track.id, moment}] = size_t(std::ranges::count_if(points, [&](const ScanPoint& p) {
                     const Point3 at = transform(to_box, {p[0], p[1], p[2]});
                     return std::abs(at[0]) <= track.size[0] / 2 + kSurface &&

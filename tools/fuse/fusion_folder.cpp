@@ -135,10 +135,19 @@ Result<FusionFolder> FusionFolder::open(const Path& folder, const FusionFolderOp
     f.encoding_ = options.depth;
     SR_TRY(f.encoding_.usual_unit, read_depth_unit(folder));
     SR_TRY(f.classes_, PictureClasses::create(options.map));
+    if (!first_depth_size(folder))
+        f.lidar_ = find_lidar(folder);
     SR_CHECK(f.read_poses(poses, options));
     SR_CHECK(f.find_frames(poses, options));
     SR_CHECK(f.check_pictures());
+    if (f.lidar_) {
+        SR_TRY(SweepFrames sweeps, SweepFrames::open(*f.lidar_, f.placed_, f.cameras_));
+        f.seen_ = sweeps.frames();
+        f.sweeps_ = std::make_shared<SweepFrames>(std::move(sweeps));
+        return f;
+    }
     SR_CHECK(f.note_encoding());
+    f.find_views();
     return f;
 }
 
@@ -162,11 +171,13 @@ Status FusionFolder::read_poses(const Path& poses, const FusionFolderOptions& o)
     const std::optional<FoundPath> found = find_path(poses);
     CameraPath path;
     if (size || !found || found->format != PathFormat::transforms) {
-        SR_TRY(path, read_camera_path(poses, fallback, o.placement));
+        SR_TRY(path, read_camera_path(poses, fallback));
     } else {
         SR_TRY(path, read_transforms(found->path));
-        SR_CHECK(place_path(path, o.placement, quote_path(poses)));
     }
+    const Rigid before = path.frames[0].pose.world_to_camera;
+    SR_CHECK(place_path(path, o.placement, quote_path(poses)));
+    placed_ = compose(path.frames[0].pose.camera_to_world(), before);
     warnings_ = std::move(path.warnings);
     if (path.body)
         warnings_.push_back(body_text(quote_path(poses), *path.body));
@@ -178,11 +189,6 @@ Status FusionFolder::read_poses(const Path& poses, const FusionFolderOptions& o)
                         "{} has no intrinsics: expected {}, or `fx` (and `fy`, `cx`, `cy`), or `fov_x`",
                         quote_path(poses), quote_path(folder_ / "intrinsics.json"));
         SR_CHECK(apply_options(o, k));
-        if (k.model != CameraModel::pinhole)
-            return fail(ErrorCode::bad_input,
-                        "{}: {} has a lens with distortion, expected a pinhole: undistort its pictures first (COLMAP: "
-                        "image_undistorter)",
-                        quote_path(poses), name_of(i));
     }
     return {};
 }
@@ -217,11 +223,14 @@ std::string FusionFolder::name_of(size_t frame) const
 Status FusionFolder::check_pictures()
 {
     for (size_t i = 0; i < cameras_.size(); ++i) {
-        const FramePictures& p = pictures_[i];
+        FramePictures& p = pictures_[i];
+        if (lidar_)
+            p.depth.clear();
         for (const Path* path : {&p.depth, &p.label, &p.color})
             if (!path->empty() && !is_file(*path))
                 return fail(ErrorCode::bad_input, "{}: {} is missing", name_of(i), quote_path(*path));
-        SR_CHECK(fit_intrinsics(i));
+        if (!lidar_)
+            SR_CHECK(fit_intrinsics(i));
         const ImageSize depth = depth_size(i);
         for (const Path* path : {&p.label, &p.color}) {
             if (path->empty() || is_jpeg(*path))
@@ -263,6 +272,29 @@ Status FusionFolder::note_encoding()
                                         "(2^24 - 1) (`depth.kind` carla)",
                                         quote_path(pictures_[0].depth)));
     return {};
+}
+
+// frames of equal lenses share what is known of these
+void FusionFolder::find_views()
+{
+    std::vector<std::shared_ptr<const LensViews>> lenses;
+    for (size_t i = 0; i < cameras_.size(); ++i) {
+        const CameraFrame& camera = cameras_[i];
+        if (camera.intrinsics.model == CameraModel::pinhole) {
+            views_.push_back({i, nullptr});
+            seen_.push_back(camera);
+            continue;
+        }
+        auto lens = std::ranges::find_if(lenses, [&](const auto& l) { return l->lens() == camera.intrinsics; });
+        if (lens == lenses.end())
+            lens = lenses.insert(lens, std::make_shared<LensViews>(camera.intrinsics));
+        for (const PinholeView& view : (*lens)->views()) {
+            views_.push_back({i, *lens, size_t(&view - (*lens)->views().data())});
+            seen_.push_back(camera);
+            seen_.back().pose.world_to_camera = compose(view.from_sensor, camera.pose.world_to_camera);
+            seen_.back().intrinsics = view.intrinsics;
+        }
+    }
 }
 
 ImageSize FusionFolder::depth_size(size_t frame) const
@@ -307,32 +339,66 @@ Status FusionFolder::load_labels(size_t frame, DepthImages& images) const
     return {};
 }
 
-Result<DepthImages> FusionFolder::load(size_t frame) const
+Status FusionFolder::load_colors(size_t frame, DepthImages& images) const
 {
-    const FramePictures& p = pictures_[frame];
-    DepthImages images;
-    SR_TRY(DepthImage depth, read_depth_image(p.depth, encoding_));
+    const Path& path = pictures_[frame].color;
+    SR_TRY(ImageRgb8 color, read_image_rgb8(path));
+    const ImageSize size{color.width, color.height};
+    SR_CHECK(check_view(path, size, depth_size(frame)));
+    if (size != depth_size(frame))
+        color = resampled(color, depth_size(frame));
+    images.colors = std::move(color.pixels);
+    return {};
+}
+
+Status FusionFolder::load_depth(size_t frame, Loaded& loaded) const
+{
+    const Path& path = pictures_[frame].depth;
+    SR_TRY(DepthImage depth, read_depth_image(path, encoding_));
     if (depth.size != depth_size(frame))
-        return fail(ErrorCode::bad_input, "{} changed its size", quote_path(p.depth));
-    if (depth.kind == DepthKind::ray)
-        make_axial(depth, cameras_[frame].intrinsics);
-    images.depth = std::move(depth.metres);
-    if (!p.label.empty() && classes_.counted())
+        return fail(ErrorCode::bad_input, "{} changed its size", quote_path(path));
+    const Intrinsics& k = cameras_[frame].intrinsics;
+    loaded.radial = depth.kind == DepthKind::ray || Lens(k).radial_depth();
+    if (loaded.radial && k.model == CameraModel::pinhole)
+        make_axial(depth, k);
+    loaded.images.depth = std::move(depth.metres);
+    return {};
+}
+
+// colours and labels of a picture; depth becomes 0 where the map of labels leaves a pixel out
+Status FusionFolder::load_picture(size_t frame, DepthImages& images) const
+{
+    if (!pictures_[frame].label.empty() && classes_.counted())
         SR_CHECK(load_labels(frame, images));
-    if (!p.color.empty()) {
-        SR_TRY(ImageRgb8 color, read_image_rgb8(p.color));
-        const ImageSize size{color.width, color.height};
-        SR_CHECK(check_view(p.color, size, depth_size(frame)));
-        if (size != depth_size(frame))
-            color = resampled(color, depth_size(frame));
-        images.colors = std::move(color.pixels);
+    if (!pictures_[frame].color.empty())
+        SR_CHECK(load_colors(frame, images));
+    return {};
+}
+
+Result<DepthImages> FusionFolder::load_view(const View& view) const
+{
+    Loaded& loaded = *loaded_;
+    if (loaded.frame != view.frame) {
+        loaded = {};
+        SR_CHECK(load_depth(view.frame, loaded));
+        SR_CHECK(load_picture(view.frame, loaded.images));
+        loaded.frame = view.frame;
     }
-    return images;
+    return view.lens ? view.lens->seen_by(view.number, loaded.images, loaded.radial) : loaded.images;
 }
 
 DepthFrames FusionFolder::frames() const
 {
-    return {cameras_, [this](size_t frame) { return load(frame); }};
+    if (!sweeps_)
+        return {seen_, [this](size_t frame) { return load_view(views_[frame]); }};
+    return {seen_, [this](size_t frame) {
+                return sweeps_->load(frame, cameras_, [this](size_t picture) -> Result<DepthImages> {
+                    const ImageSize size = depth_size(picture);
+                    DepthImages images{std::vector(size_t(size.width) * size.height, 1.f), {}, {}};
+                    SR_CHECK(load_picture(picture, images));
+                    return images;
+                });
+            }};
 }
 
 } // namespace semrover

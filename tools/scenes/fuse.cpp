@@ -170,11 +170,16 @@ Json settings_of(const FuseArguments& o)
 
 Json figures_of(const FusionFolder& folder, const FusedMesh& fused, const Grids& grids, const Device& device)
 {
-    return {{"frames", folder.cameras().size()},    {"labelled_frames", folder.labelled()},
-            {"colored_frames", folder.colored()},   {"blocks", fused.figures.blocks},
-            {"chunks", fused.figures.chunks},       {"vertices", fused.mesh.positions.size()},
-            {"faces", fused.mesh.faces.size()},     {"unlabelled_faces", fused.figures.unlabelled_faces},
-            {"cells", grids.semantic.cells.size()}, {"peak_device_bytes", device.peak_bytes()}};
+    return {{"frames", folder.count()},
+            {"labelled_frames", folder.labelled()},
+            {"colored_frames", folder.colored()},
+            {"blocks", fused.figures.blocks},
+            {"chunks", fused.figures.chunks},
+            {"vertices", fused.mesh.positions.size()},
+            {"faces", fused.mesh.faces.size()},
+            {"unlabelled_faces", fused.figures.unlabelled_faces},
+            {"cells", grids.semantic.cells.size()},
+            {"peak_device_bytes", device.peak_bytes()}};
 }
 
 // all of them or none; what else is in the folder stays
@@ -191,9 +196,9 @@ Status write_outputs(const FuseArguments& o, const FusedMesh& fused, const Grids
 
 void print_warnings(const FusionFolder& folder, const FusedMesh& fused)
 {
-    if (folder.labelled() < folder.cameras().size())
-        print_stderr("semrover: warning: {} of {} frames have no labels\n", folder.cameras().size() - folder.labelled(),
-                     folder.cameras().size());
+    if (folder.labelled() < folder.count() && !folder.has_sweeps())
+        print_stderr("semrover: warning: {} of {} frames have no labels\n", folder.count() - folder.labelled(),
+                     folder.count());
     if (fused.figures.unlabelled_faces)
         print_stderr("semrover: warning: {} of {} faces have no label\n", fused.figures.unlabelled_faces,
                      fused.mesh.faces.size());
@@ -223,7 +228,7 @@ Status run_fuse(FuseArguments o, const Globals& globals)
     if (globals.json)
         fmt::print("{}\n", figures.dump());
     else
-        fmt::print("{} frames: {} faces, {} voxels in {}\n", folder.cameras().size(), fused.mesh.faces.size(),
+        fmt::print("{} frames: {} faces, {} voxels in {}\n", folder.count(), fused.mesh.faces.size(),
                    grids.semantic.cells.size(), quote_path(o.output));
     return {};
 }
@@ -254,7 +259,9 @@ void add_fuse(CLI::App& app, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<FuseArguments>();
     CLI::App* c = app.add_subcommand("fuse", "depth, poses, labels and colours of frames to a mesh and grids");
-    c->add_option("DIR", o->folder, "[CAMERA/]{depth,label,color}/000000.png and transforms.json")->required();
+    c->add_option("DIR", o->folder,
+                  "[CAMERA/]{depth,label,color}/000000.png, or LIDAR/sweeps.json, and transforms.json")
+        ->required();
     c->add_option("-o,--output", o->output, "folder for mesh.glb, semantic.sgrid, voxfield.sgrid, run.json")
         ->required();
     c->add_option("--poses", o->poses, "a trajectory; DIR/transforms.json or groundtruth.txt");
