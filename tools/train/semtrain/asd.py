@@ -166,11 +166,12 @@ def read_init(folder, config):
 def main(arguments=None):
     p = settings.parser("asd", __doc__.splitlines()[0])
     p.add_argument("--frames", required=True, help="folder of drives (see semtrain/frames.py)")
-    p.add_argument("--vae", required=True, help="folder of the VAE (config.json, safetensors); it stays as it is")
+    p.add_argument("--vae", help="folder of the VAE (config.json, safetensors); it stays as it is; default: INIT/vae")
     p.add_argument("--held-out", help="folder of drives; each checkpoint logs their loss, and draws of the first")
     p.add_argument("--init", help="model folder to start from: a renderer, or Stable Diffusion 1.5")
     p.add_argument("--cache", help="folder for the frames' latents; default: OUT/latents")
     options = p.parse_args(arguments)
+    options.vae = options.vae or model_folder.vae_of(options.init)
     config = settings.resolve("asd", options)
     state = read_init(options.init, config) if options.init else None
     cache = options.cache or os.path.join(options.output, "latents")

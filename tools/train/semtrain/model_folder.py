@@ -66,6 +66,14 @@ def weights_of(folder):
                      "shards and single files, too, and writes the former")
 
 
+def vae_of(folder):
+    """the VAE in a model folder, which may be None"""
+    vae = os.path.join(folder or "", "vae")
+    if not folder or not os.path.isdir(vae):
+        raise SystemExit("--vae is missing" + (f", and {folder} has no vae/" if folder else ""))
+    return vae
+
+
 def name_today(name):
     """of a tensor: as diffusers calls it now"""
     return re.sub(r"(?<=\.)(query|key|value|proj_attn)(?=\.)", lambda found: OLD_NAMES[found[0]], name)

@@ -16,6 +16,8 @@ from semtrain import safetensors_file, vae, vsd
 from semtrain.draws import draws
 from semtrain.frames import find_drives
 from semtrain.latents import load_vae, sequences
+from semtrain.nets.video_unet import UNetSpatioTemporalConditionModel
+from semtrain.nets.video_vae import AutoencoderKLTemporalDecoder
 from semtrain.trainer import CHECKPOINT
 from test_recipes_asd import COMMON, VAE, draw_drive
 
@@ -120,16 +122,66 @@ class Recipes(unittest.TestCase):
         self.assertTrue(torch.equal(wide[:, :8], narrow["conv_in.weight"].float()))
         self.assertEqual(float(wide[:, 8:].abs().max()), 0)
 
+    def put_svd(self, folder):
+        """Stable Video Diffusion as the hub has it, but narrow: configs with its fields, fp16 files, 8 channels in"""
+        unet = {"_class_name": "UNetSpatioTemporalConditionModel", "_diffusers_version": "0.24.0.dev0",
+                "addition_time_embed_dim": 8, "block_out_channels": [32, 64], "cross_attention_dim": 16,
+                "down_block_types": ["CrossAttnDownBlockSpatioTemporal", "DownBlockSpatioTemporal"], "in_channels": 8,
+                "layers_per_block": 1, "num_attention_heads": [2, 4], "num_frames": 25, "out_channels": 4,
+                "projection_class_embeddings_input_dim": 24, "sample_size": 96, "transformer_layers_per_block": 1,
+                "up_block_types": ["UpBlockSpatioTemporal", "CrossAttnUpBlockSpatioTemporal"]}
+        levels = ["DownEncoderBlock2D"] * 4
+        of_videos = {"_class_name": "AutoencoderKLTemporalDecoder", "block_out_channels": [32] * 4,
+                     "down_block_types": levels, "force_upcast": True, "in_channels": 3, "latent_channels": 4,
+                     "layers_per_block": 1, "out_channels": 3, "sample_size": 768, "scaling_factor": 0.18215}
+        torch.manual_seed(2)
+        for part, config, network in (("unet", unet, UNetSpatioTemporalConditionModel),
+                                      ("vae", of_videos, AutoencoderKLTemporalDecoder)):
+            os.makedirs(os.path.join(folder, part))
+            with open(os.path.join(folder, part, "config.json"), "w") as file:
+                json.dump(config, file)
+            safetensors_file.write(os.path.join(folder, part, "diffusion_pytorch_model.fp16.safetensors"),
+                                   {name: t.half() for name, t in network(config).state_dict().items()})
+        return unet
+
+    def test_stable_video_diffusion_as_the_hub_has_it_trains_in_one_command(self):
+        unet = self.put_svd(self.path("svd"))
+        begin = safetensors_file.read(self.path("svd", "unet", "diffusion_pytorch_model.fp16.safetensors"))
+        self.train(vsd, "vsd", "of_svd", "--init", self.path("svd"), "--set", "steps=1", "--set", "learning_rate=0")
+        self.assertEqual(os.listdir(self.path("of_svd", "vae")), os.listdir(self.path("svd", "vae")))
+        with open(self.path("of_svd", "renderer", "config.json")) as file:
+            config = json.load(file)
+        self.assertEqual((config["in_channels"], config["num_frames"]), (9, 3))
+        for name in ("block_out_channels", "cross_attention_dim", "num_attention_heads", "down_block_types"):
+            self.assertEqual(config[name], unet[name])
+        made = safetensors_file.read(self.path("of_svd", "renderer", "diffusion_pytorch_model.safetensors"))
+        self.assertEqual(set(made), set(begin))
+        for name, tensor in made.items():
+            kept = tensor[:, :8] if name == "conv_in.weight" else tensor
+            self.assertTrue(torch.equal(kept, begin[name]), name)
+        self.assertEqual(float(made["conv_in.weight"][:, 8].abs().max()), 0)
+        if os.environ.get("SEMROVER"):
+            self.refine("of_svd", "svd_refined")
+
+    def test_without_a_vae_it_says_so(self):
+        with self.assertRaisesRegex(SystemExit, "--vae is missing$"):
+            self.train(vsd, "vsd", "no_vae")
+        os.makedirs(self.path("bare"), exist_ok=True)
+        with self.assertRaisesRegex(SystemExit, "--vae is missing, and .*bare has no vae/"):
+            self.train(vsd, "vsd", "no_vae", "--init", self.path("bare"))
+
+    def refine(self, model, output):
+        done = subprocess.run([os.environ["SEMROVER"], "refine", self.path("frames", "0", "buffer"), "-m",
+                               self.path(model), "-o", self.path(output), "--json"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(json.loads(done.stdout)["frames"], 3)
+
     def test_the_engine_loads_the_folder_and_draws_a_drive_with_it(self):
         self.train_vsd("model", "--held-out", self.path("frames"))
         self.assertTrue(os.path.exists(self.path("model", "held_out_2.png")))
-        engine = os.environ.get("SEMROVER")
-        if not engine:
+        if not os.environ.get("SEMROVER"):
             self.skipTest("SEMROVER names no engine")
-        done = subprocess.run([engine, "refine", self.path("frames", "0", "buffer"), "-m", self.path("model"), "-o",
-                               self.path("refined"), "--json"], capture_output=True, text=True)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertEqual(json.loads(done.stdout)["frames"], 3)
+        self.refine("model", "refined")
         with Image.open(self.path("refined", "frames", "000002.png")) as picture:
             self.assertEqual(picture.size, (64, 48))
 
