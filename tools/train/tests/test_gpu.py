@@ -114,8 +114,9 @@ class Train(OnAMachine):
         self.assertEqual(code, 0, out)
         code, out = self.run_tool("train", self.path("second"), "--from", self.path("first"), "--grids",
                                   self.path("work/streets"), "--held", self.path("work/held"), *self.SMALL,
-                                  **{**self.TIMES, "MINUTES": "0.4"})
+                                  "--set", "batch=2", **{**self.TIMES, "MINUTES": "0.4", "PROCESSES": "2"})
         self.assertEqual(code, 0, out)
+        self.assertIn("processes: 2", out)
         files = [os.path.join(folder, name) for folder, _, names in os.walk(self.path("second")) for name in names]
         self.assertLessEqual({os.path.relpath(f, self.path("second")) for f in files}, {
             "model/model_index.json", "model/voxfield_transformer/config.json", "curve.png", "log.jsonl",
