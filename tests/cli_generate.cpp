@@ -304,6 +304,35 @@ TEST_F(CliGenerate, state_of_other_settings_is_refused_without_yes)
     EXPECT_TRUE(bytes_of("out.sgrid", "--seed 8 -y") == bytes_of("other.sgrid", "--seed 8"));
 }
 
+// with another one a run would go on to bytes of neither
+TEST_F(CliGenerate, state_of_another_scheduler_or_of_other_kernels_is_refused_without_yes)
+{
+    std::filesystem::create_directory(folder_ / "model");
+    std::filesystem::copy(kModel, folder_ / "model/voxfield_transformer");
+    std::filesystem::create_directory(folder_ / "model/voxfield_scheduler");
+    const auto put_scheduler = [&](double end) {
+        folder_.put("model/voxfield_scheduler/scheduler_config.json",
+                    Json{{"_class_name", "DDPMScheduler"}, {"beta_end", end}, {"prediction_type", "sample"}}.dump());
+    };
+    put_scheduler(0.02);
+    const std::string line = "generate " + path("in.sgrid") + " -m " + path("model") + " -o " + path("out.sgrid") +
+                             " --quiet --batch 1" + kSettings;
+    ChildProgram child(line);
+    while (journal_lines("out.sgrid") < 1 && child.running())
+        usleep(500);
+    ASSERT_EQ(child.stop(SIGKILL), 128 + SIGKILL);
+    const auto refused = [&] {
+        expect_error(semrover_program(line), 3, "holds a run with other settings, model, input or device");
+    };
+    put_scheduler(0.019);
+    refused();
+    put_scheduler(0.02);
+    ASSERT_EQ(setenv("SEMROVER_LIMITS", "variant=simt", 1), 0);
+    refused();
+    ASSERT_EQ(unsetenv("SEMROVER_LIMITS"), 0);
+    EXPECT_EQ(semrover_program(line).code, 0);
+}
+
 TEST_F(CliGenerate, a_dry_run_writes_nothing_and_says_what_a_run_would_take)
 {
     const size_t entries = folder_.entries();

@@ -1,11 +1,13 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/drawing.h"
+#include "engine/job/device_key.h"
 
 #include "engine/format/buffer_folder.h"
 #include "engine/format/image.h"
 #include "engine/format/labelled_points.h"
 #include "engine/job/budget_meter.h"
+#include "engine/job/device_key.h"
 #include "engine/job/drawing_store.h"
 #include "engine/job/empty_frames.h"
 #include "engine/job/input_hashes.h"
@@ -270,8 +272,6 @@ Json drawing_settings(const DrawingOptions& o, const Device& device)
     const uint64_t scene = grid ? hash_grid(*grid) : hash_splats(std::get<Splats>(o.scene));
     Json settings{{"command", "render"},
                   {"version", kVersion},
-                  {"device", device.name()},
-                  {"driver", device.driver()},
                   {"scene", hash_text(scene)},
                   {"path", hash_text(hash_cameras(o.path))},
                   {"drive", drawing_json(o.draw)},
@@ -279,6 +279,7 @@ Json drawing_settings(const DrawingOptions& o, const Device& device)
                   {"visible_depth", o.visible_depth},
                   {"top", {o.top.width, o.top.height}}};
     settings.update(encoding_json(o.encoding));
+    settings.update(device_key(device));
     return settings;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/transforms.h"
+#include "engine/job/device_key.h"
 #include "engine/job/frame_boxes.h"
 #include "engine/job/input_hashes.h"
 #include "engine/job/outputs.h"
@@ -335,8 +336,6 @@ Result<Json> refinement_settings(const Refinement& r, const Device& device)
     SR_TRY(const uint64_t model, r.model.hash());
     Json settings{{"command", "refine"},
                   {"version", kVersion},
-                  {"device", device.name()},
-                  {"driver", device.driver()},
                   {"input", input},
                   {"model", hash_text(model)},
                   {"precision", o.precision == DType::f32 ? "fp32" : "fp16"},
@@ -349,6 +348,7 @@ Result<Json> refinement_settings(const Refinement& r, const Device& device)
     if (r.settings.frame_history > 0) // not there without, so that runs of earlier versions go on
         settings["frame_history"] = r.settings.frame_history;
     settings.update(encoding_json(o.encoding)); // likewise
+    settings.update(device_key(device));
     settings.update(r.model.video() ? video_settings(r)
                                     : Json{{"guidance_scale", r.settings.asd.guidance_scale},
                                            {"previous_noise", r.settings.asd.previous_noise}});

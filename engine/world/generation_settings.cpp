@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/world/generation_settings.h"
 
+#include "engine/job/device_key.h"
 #include "engine/job/version.h"
 #include "engine/scene/tiles.h"
 #include "runtime/base/hash.h"
@@ -97,8 +98,6 @@ Result<Json> settings_json(const GenerationSettings& s, const Device& device, st
     SR_TRY(const uint64_t model_hash, hash_folder(s.model.transformer));
     Json settings{{"command", std::string(command)},
                   {"version", kVersion},
-                  {"device", device.name()},
-                  {"driver", device.driver()},
                   {"grid", hash_text(grid_hash)},
                   {"model", hash_text(model_hash)},
                   {"precision", s.precision == DType::f32 ? "fp32" : "fp16"},
@@ -113,7 +112,12 @@ Result<Json> settings_json(const GenerationSettings& s, const Device& device, st
                   {"jump_length", s.repaint.jump_length},
                   {"jump_n_sample", s.repaint.jump_n_sample},
                   {"known_tokens", s.repaint.known == KnownTokens::clean ? "clean" : "noised"}};
-    // not there where they say nothing: runs of earlier versions go on
+    settings.update(device_key(device));
+    if (const Path scheduler = s.model.folder / "voxfield_scheduler"; is_there(scheduler)) {
+        SR_TRY(const uint64_t scheduler_hash, hash_folder(scheduler));
+        settings["scheduler"] = hash_text(scheduler_hash);
+    }
+    // not there where they say nothing
     if (s.guidance.until < kLastTimestep)
         settings["guidance_until"] = s.guidance.until;
     if (s.guidance.narrows(s.model.config.attention_radius))

@@ -78,6 +78,13 @@ Status apply(DeviceLimits& limits, const std::string& key, const std::string& te
 
 } // namespace
 
+std::string kernels_text(const DeviceLimits& limits)
+{
+    const MatrixShape& m = limits.matrix;
+    return fmt::format("features {:#x}, subgroup {}, matrix {}x{}x{}, {}", limits.features, limits.subgroup_size, m.m,
+                       m.n, m.k, limits.force_variant.empty() ? "any variant" : limits.force_variant);
+}
+
 Status override_limits(DeviceLimits& limits, const std::string& text)
 {
     std::stringstream in(text);

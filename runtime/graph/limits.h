@@ -41,6 +41,9 @@ struct DeviceLimits {
     bool force_staging = false;        // upload through staging even where memory is host-visible
 };
 
+// Which variants of kernels a device gets, as far as they give other bits: for keys of results
+std::string kernels_text(const DeviceLimits& limits);
+
 // Lowers limits for tests:
 // "shared=16384,range=67108864,alloc=536870912,fp16=0,coopmat=0,variant=simt,staging=1,branches=1,submit=0.001".
 // Raising one above what the device has is refused.
