@@ -6,6 +6,7 @@
 #include "runtime/base/json.h"
 #include "tests/support/jpeg_file.h"
 #include "tests/support/json_text.h"
+#include "tests/support/lpips_reference.h"
 #include "tests/support/png_file.h"
 #include "tests/support/program.h"
 #include "tools/trajectory/camera_path.h"
@@ -42,9 +43,26 @@ struct Pictures {
     }
     void put_depth(std::string_view name, uint16_t value, uint32_t width = kWidth) const
     {
+        put_depths(name, value, value, width);
+    }
+    void put_depths(std::string_view name, uint16_t left, uint16_t right, uint32_t width = kWidth) const
+    {
         const Path path = folder / name;
         std::filesystem::create_directories(path.parent_path());
-        EXPECT_TRUE(write_png_gray16(path, width, kHeight, std::vector<uint16_t>(size_t(width) * kHeight, value)));
+        std::vector<uint16_t> pixels(size_t(width) * kHeight);
+        for (size_t i = 0; i < pixels.size(); ++i)
+            pixels[i] = i % width < 12 ? left : right;
+        EXPECT_TRUE(write_png_gray16(path, width, kHeight, pixels));
+    }
+    void put_random(std::string_view name, uint32_t width, uint32_t height, uint32_t seed) const
+    {
+        const Path path = folder / name;
+        std::filesystem::create_directories(path.parent_path());
+        std::mt19937 random(seed);
+        std::vector<uint8_t> pixels(size_t(width) * height * 3);
+        for (uint8_t& v : pixels)
+            v = uint8_t(random());
+        EXPECT_TRUE(write_png_rgb8(path, width, height, pixels));
     }
 };
 
@@ -179,6 +197,46 @@ TEST(CliEvalFrames, what_cannot_be_compared_is_one_clear_line)
     expect_error(eval("frames -q " + one + " " + one + " --labels " + (p / "masks")), 3,
                  "is 27 x 16 pixels, expected 24 x 16");
     expect_error(eval("frames " + one), 2, "TRUTH is required");
+}
+
+TEST(CliEvalFrames, lpips_of_two_networks_and_two_sizes)
+{
+    const Pictures p;
+    p.put_random("made/front/color/000000.png", 37, 41, 1);
+    p.put_random("made/left/color/000000.png", 64, 33, 2);
+    p.put_random("true/front/color/000000.png", 37, 41, 3);
+    p.put_random("true/left/color/000000.png", 64, 33, 2); // equal
+    const std::string folders = (p / "made") + " " + (p / "true");
+    const auto picture = [&](const char* name) { return read_png_rgb8(p.folder / name).value(); };
+    for (const bool vgg : {false, true}) {
+        const LpipsReference reference(vgg, 16);
+        reference.weights.write(p.folder / "net.safetensors");
+        const ProgramResult result = eval("frames --json -q " + folders + " --lpips " + (p / "net.safetensors"));
+        ASSERT_EQ(result.code, 0) << result.err;
+        const Json report = json_of(result.out);
+        const double expect = reference(picture("made/front/color/000000.png"), picture("true/front/color/000000.png"));
+        EXPECT_NEAR(report["frames"][0]["lpips"].get<double>(), expect, 1e-5 * expect);
+        EXPECT_EQ(report["frames"][1]["lpips"], 0);
+        EXPECT_NEAR(report["lpips"].get<double>(), expect / 2, 1e-5 * expect);
+        EXPECT_EQ(report["network"]["kind"], vgg ? "vgg" : "alex");
+        EXPECT_FALSE(json_of(eval("frames --json -q " + folders).out).contains("lpips"));
+        const ProgramResult table = eval("frames -q " + folders + " --lpips " + (p / "net.safetensors"));
+        EXPECT_NE(table.out.find(fmt::format("\nLPIPS {:.4f} in the mean ({})\n", expect / 2, vgg ? "vgg" : "alex")),
+                  std::string::npos)
+            << table.out;
+    }
+    p.put("small/000000.png", 1, 2); // 24 x 16: VGG16 sees it, AlexNet does not
+    const std::string small = (p / "small") + " " + (p / "small");
+    EXPECT_EQ(eval("frames -q " + small + " --lpips " + (p / "net.safetensors")).code, 0);
+    StateDict alex = LpipsReference(false, 16).weights;
+    alex.write(p.folder / "net.safetensors");
+    expect_error(eval("frames -q " + small + " --lpips " + (p / "net.safetensors")), 3,
+                 "000000.png' is 24 x 16 pixels, expected 31 x 31 or more, what the network of LPIPS can see");
+    alex.tensors.erase("features.3.bias");
+    alex.write(p.folder / "net.safetensors");
+    expect_error(eval("frames -q " + small + " --lpips " + (p / "net.safetensors")), 3,
+                 "1 missing: features.3.bias [12]");
+    expect_error(eval("frames -q " + small + " --lpips " + (p / "none.safetensors")), 3, "none.safetensors");
 }
 
 // three frames, 0.1 m apart to the right, before a wall at 2 m with a focal length of 20: a pixel each
