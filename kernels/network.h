@@ -143,8 +143,8 @@ struct FeatureMap {
 // y[n] = bias[n] + sum over taps and channels of w[n, tap, c] x[c] at the tap's pixel, zeros outside the image. Runs as
 // an implicit GEMM. Two inputs are read as if concatenated along channels.
 struct ConvOptions {
-    uint32_t kernel = 3;      // square; 1 has no padding, others as below
-    uint32_t stride = 1;      // 1 or 2
+    uint32_t kernel = 3; // square; 1 has no padding, others as below
+    uint32_t stride = 1;
     bool end_padding = false; // zeros to the right and below only, (0, 1, 0, 1), instead of all around
     uint32_t upsampled_height = 0, upsampled_width = 0; // nearest x2 before the convolution, to 2n or 2n - 1; 0: none
     DType dtype = DType::f16;                           // of y

@@ -4,6 +4,8 @@
 
 #include "kernels/network.h"
 
+#include <array>
+
 // Ops of networks that recognise what is in images and point clouds, as those of kernels/network.h
 namespace semrover {
 
@@ -18,11 +20,12 @@ struct PoolOptions {
 };
 FeatureMap pool2d(Graph& g, FeatureMap x, const PoolOptions& options, const PartOf& part = {});
 
-// y = 2 / 255 image - 1 at another size, bilinear between the two nearest pixels each way, with pixels as squares
-// (align_corners = False) and no antialiasing
+// y = (2 / 255 image - 1 - shift) / scale at another size or the same, bilinear between the two nearest pixels each
+// way, with pixels as squares (align_corners = False) and no antialiasing
 struct ResizeOptions {
     uint32_t in_height = 0, in_width = 0, out_height = 0, out_width = 0; // pixels, up to 16384
     DType dtype = DType::f32;                                            // of y
+    std::array<float, 3> shift = {0, 0, 0}, scale = {1, 1, 1};           // of R, G, B
 };
 constexpr uint32_t rgb_words(uint32_t height, uint32_t width) // of an image of bytes
 {
@@ -31,6 +34,13 @@ constexpr uint32_t rgb_words(uint32_t height, uint32_t width) // of an image of 
 [[nodiscard]] FeatureMap resize_bilinear(Graph& g,
                                          Tensor pixels, // [images, rgb_words()] u32 array: bytes R G B R ..
                                          const ResizeOptions& options); // 3 channels
+
+// y = sum over channels of w (a / (|a| + eps) - b / (|b| + eps))^2 of every pixel: how far apart two images' directions
+// are
+[[nodiscard]] FeatureMap unit_distance(Graph& g, FeatureMap a,
+                                       FeatureMap b, // as a
+                                       Tensor w,     // [1, C] fp32, or padded to kRowPadding
+                                       float eps);   // 1 channel, fp32
 
 // -- networks of points: sets of equally many points, one after the other ---------------------------------------------
 

@@ -152,6 +152,7 @@ TEST_F(Drive, is_fused_and_measured_from_a_set_as_from_its_folder)
     };
     for (const char* eval :
          {"eval frames --json -q @ @ --visible @ --labels @", "eval frames --json -q @/left/color @/front",
+          "eval depth --json -q @ @", "eval depth --json -q @/left @/front", "eval labels --json -q @/left @/front",
           "eval flicker --json -q @ --depth @ --path @/transforms.json"})
         EXPECT_EQ(figures(eval, "in"), figures(eval, "set")) << eval;
 }

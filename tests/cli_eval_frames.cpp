@@ -6,6 +6,7 @@
 #include "runtime/base/json.h"
 #include "tests/support/jpeg_file.h"
 #include "tests/support/json_text.h"
+#include "tests/support/lpips_reference.h"
 #include "tests/support/png_file.h"
 #include "tests/support/program.h"
 #include "tools/trajectory/camera_path.h"
@@ -42,9 +43,26 @@ struct Pictures {
     }
     void put_depth(std::string_view name, uint16_t value, uint32_t width = kWidth) const
     {
+        put_depths(name, value, value, width);
+    }
+    void put_depths(std::string_view name, uint16_t left, uint16_t right, uint32_t width = kWidth) const
+    {
         const Path path = folder / name;
         std::filesystem::create_directories(path.parent_path());
-        EXPECT_TRUE(write_png_gray16(path, width, kHeight, std::vector<uint16_t>(size_t(width) * kHeight, value)));
+        std::vector<uint16_t> pixels(size_t(width) * kHeight);
+        for (size_t i = 0; i < pixels.size(); ++i)
+            pixels[i] = i % width < 12 ? left : right;
+        EXPECT_TRUE(write_png_gray16(path, width, kHeight, pixels));
+    }
+    void put_random(std::string_view name, uint32_t width, uint32_t height, uint32_t seed) const
+    {
+        const Path path = folder / name;
+        std::filesystem::create_directories(path.parent_path());
+        std::mt19937 random(seed);
+        std::vector<uint8_t> pixels(size_t(width) * height * 3);
+        for (uint8_t& v : pixels)
+            v = uint8_t(random());
+        EXPECT_TRUE(write_png_rgb8(path, width, height, pixels));
     }
 };
 
@@ -179,6 +197,188 @@ TEST(CliEvalFrames, what_cannot_be_compared_is_one_clear_line)
     expect_error(eval("frames -q " + one + " " + one + " --labels " + (p / "masks")), 3,
                  "is 27 x 16 pixels, expected 24 x 16");
     expect_error(eval("frames " + one), 2, "TRUTH is required");
+}
+
+TEST(CliEvalFrames, lpips_of_two_networks_and_two_sizes)
+{
+    const Pictures p;
+    p.put_random("made/front/color/000000.png", 37, 41, 1);
+    p.put_random("made/left/color/000000.png", 64, 33, 2);
+    p.put_random("true/front/color/000000.png", 37, 41, 3);
+    p.put_random("true/left/color/000000.png", 64, 33, 2); // equal
+    const std::string folders = (p / "made") + " " + (p / "true");
+    const auto picture = [&](const char* name) { return read_png_rgb8(p.folder / name).value(); };
+    for (const bool vgg : {false, true}) {
+        const LpipsReference reference(vgg, 16);
+        reference.weights.write(p.folder / "net.safetensors");
+        const ProgramResult result = eval("frames --json -q " + folders + " --lpips " + (p / "net.safetensors"));
+        ASSERT_EQ(result.code, 0) << result.err;
+        const Json report = json_of(result.out);
+        const double expect = reference(picture("made/front/color/000000.png"), picture("true/front/color/000000.png"));
+        EXPECT_NEAR(report["frames"][0]["lpips"].get<double>(), expect, 1e-5 * expect);
+        EXPECT_EQ(report["frames"][1]["lpips"], 0);
+        EXPECT_NEAR(report["lpips"].get<double>(), expect / 2, 1e-5 * expect);
+        EXPECT_EQ(report["network"]["kind"], vgg ? "vgg" : "alex");
+        EXPECT_FALSE(json_of(eval("frames --json -q " + folders).out).contains("lpips"));
+        const ProgramResult table = eval("frames -q " + folders + " --lpips " + (p / "net.safetensors"));
+        EXPECT_NE(table.out.find(fmt::format("\nLPIPS {:.4f} in the mean ({})\n", expect / 2, vgg ? "vgg" : "alex")),
+                  std::string::npos)
+            << table.out;
+    }
+    p.put("small/000000.png", 1, 2); // 24 x 16: VGG16 sees it, AlexNet does not
+    const std::string small = (p / "small") + " " + (p / "small");
+    EXPECT_EQ(eval("frames -q " + small + " --lpips " + (p / "net.safetensors")).code, 0);
+    StateDict alex = LpipsReference(false, 16).weights;
+    alex.write(p.folder / "net.safetensors");
+    expect_error(eval("frames -q " + small + " --lpips " + (p / "net.safetensors")), 3,
+                 "000000.png' is 24 x 16 pixels, expected 31 x 31 or more, what the network of LPIPS can see");
+    alex.tensors.erase("features.3.bias");
+    alex.write(p.folder / "net.safetensors");
+    expect_error(eval("frames -q " + small + " --lpips " + (p / "net.safetensors")), 3,
+                 "1 missing: features.3.bias [12]");
+    expect_error(eval("frames -q " + small + " --lpips " + (p / "none.safetensors")), 3, "none.safetensors");
+}
+
+TEST(CliEvalDepth, figures_by_hand_of_pixels_and_of_frames)
+{
+    const Pictures p;
+    p.put_depths("made/front/depth/000000.png", 5000, 0); // half of the truth
+    p.put_depths("made/front/depth/000001.png", 2000, 6000);
+    p.put_depths("true/front/depth/000000.png", 4000, 3000);
+    p.put_depths("true/front/depth/000001.png", 2000, 65535);
+    const std::string folders = (p / "made") + " " + (p / "true");
+    const ProgramResult result = eval("depth --json -q " + folders);
+    ASSERT_EQ(result.code, 0) << result.err;
+    const Json report = json_of(result.out);
+    EXPECT_EQ(report["metric"], "depth");
+    EXPECT_EQ(report["true_pixels"], 36 * kHeight);
+    EXPECT_EQ(report["pixels"], 24 * kHeight);
+    EXPECT_NEAR(report["share"].get<double>(), 2. / 3, 1e-12);
+    EXPECT_NEAR(report["abs_rel"].get<double>(), 0.125, 1e-6);
+    EXPECT_NEAR(report["sq_rel"].get<double>(), 0.125, 1e-6);
+    EXPECT_NEAR(report["rmse"].get<double>(), std::sqrt(0.5), 1e-6);
+    EXPECT_NEAR(report["rmse_log"].get<double>(), std::log(1.25) / std::sqrt(2), 1e-6);
+    EXPECT_EQ(report["delta2"], 1);
+    EXPECT_NEAR(report["mean_of_frames"]["rmse"].get<double>(), 0.5, 1e-6);
+    EXPECT_EQ(report["frames"][0]["name"], "front/000000");
+    EXPECT_NEAR(report["frames"][0]["rmse"].get<double>(), 1, 1e-6);
+    EXPECT_NEAR(report["frames"][1]["share"].get<double>(), 1, 1e-12);
+    const Json capped = json_of(eval("depth --json -q --max-depth 2.5 " + folders).out);
+    EXPECT_EQ(capped["true_pixels"], 12 * kHeight);
+    EXPECT_EQ(capped["rmse"], 0);
+    const ProgramResult table = eval("depth -q " + folders);
+    EXPECT_TRUE(table.out.starts_with("2 frames, 66.67 % of 576 pixels with a true depth have one\n")) << table.out;
+}
+
+TEST(CliEvalDepth, units_and_kinds_of_both_sides)
+{
+    const Pictures p;
+    p.put_depth("made/000000.png", 1280); // of KITTI: 5 m
+    p.put_depth("true/000000.png", 5000);
+    const std::string folders = (p / "made") + " " + (p / "true");
+    const auto rmse = [&](const std::string& more) {
+        const ProgramResult r = eval("depth --json -q " + folders + " " + more);
+        EXPECT_EQ(r.code, 0) << r.err;
+        return json_of(r.out)["rmse"].get<double>();
+    };
+    EXPECT_NEAR(rmse("--depth-scale 0.00390625 --truth-scale 0.001"), 0, 1e-6);
+    EXPECT_NEAR(rmse(""), 3.72, 1e-6);
+    EXPECT_NEAR(rmse("--depth-scale 0.00390625"), 5000 / 256. - 5, 1e-5); // of both
+    // along rays, a plane at 5 m is farther at the sides
+    const double focal = kWidth / 2 / std::tan(30 * 3.14159265358979323846 / 180);
+    double squares = 0;
+    for (uint32_t i = 0; i < kWidth * kHeight; ++i) {
+        const double x = (i % kWidth + 0.5 - kWidth / 2.) / focal, y = (i / kWidth + 0.5 - kHeight / 2.) / focal;
+        squares += std::pow(5 / std::sqrt(x * x + y * y + 1) - 5, 2);
+    }
+    const double expect = std::sqrt(squares / (kWidth * kHeight));
+    const std::string scales = "--depth-scale 0.00390625 --truth-scale 0.001 ";
+    EXPECT_NEAR(rmse(scales + "--depth-kind ray --truth-kind z --fov-x 60"), expect, 1e-5);
+    EXPECT_NEAR(rmse(scales + "--truth-kind ray --fov-x 60"), expect, 1e-5);
+    EXPECT_NEAR(rmse(scales + "--depth-kind ray"), 0, 1e-6); // both
+    const auto refused = [&](const std::string& more, int code, std::string_view text) {
+        expect_error(eval("depth -q " + folders + " " + more), code, text);
+    };
+    refused("--truth-kind ray", 2, "compare through the camera: --fov-x is needed");
+    refused("--fov-x 60", 2, "--fov-x has no meaning for depths that are both along rays");
+    refused("--depth-kind carla", 3, "expected CARLA's depth in 8-bit colours");
+    refused("--max-depth 0", 2, "--max-depth");
+}
+
+TEST(CliEvalDepth, what_cannot_be_compared_is_one_clear_line)
+{
+    const Pictures p;
+    p.put_depth("a/000000.png", 1000);
+    p.put_depth("b/000000.png", 1000, kWidth + 1);
+    const std::string a = p / "a", b = p / "b";
+    expect_error(eval("depth -q " + a + " " + b), 3, "b/000000.png' is 25 x 16 pixels, expected 24 x 16");
+    expect_error(eval("depth -q " + a + " " + (p / "none")), 3, "none': expected a folder, this is none");
+    p.put_depth("b/000001.png", 1000);
+    expect_error(eval("depth -q " + a + " " + b), 3, "a' has no picture '000001', which '");
+    expect_error(eval("depth -q " + b + " " + a), 3, "a' has no picture '000001', which '");
+    p.put_depth("c/000000.png", 0);
+    expect_error(eval("depth -q " + a + " " + (p / "c")), 3, "no pixel of 1 frames can be compared: 0 have a depth");
+    p.put("d/000000.png", 7, 7); // gray colours are no depth
+    expect_error(eval("depth -q " + a + " " + (p / "d")), 3, "d/000000.png'");
+    expect_error(eval("depth " + a), 2, "TRUTH is required");
+}
+
+TEST(CliEvalLabels, intersection_over_union_by_hand)
+{
+    const Pictures p;
+    p.put("made/label/000000.png", 2, 13, kWidth, true); // building, car
+    p.put("made/label/000001.png", 2, 2, kWidth, true);
+    p.put("made/label/000002.png", 3, 13, kWidth, true);
+    p.put("true/label/000000.png", 2, 13, kWidth, true);
+    p.put("true/label/000001.png", 2, 13, kWidth, true);
+    p.put("true/label/000002.png", 255, 13, kWidth, true);
+    const std::string folders = (p / "made") + " " + (p / "true");
+    const ProgramResult result = eval("labels --json -q " + folders);
+    ASSERT_EQ(result.code, 0) << result.err;
+    const Json report = json_of(result.out);
+    const size_t half = 12 * kHeight; // of a picture
+    EXPECT_EQ(report["metric"], "labels");
+    EXPECT_EQ(report["pixels"], 5 * half);
+    EXPECT_EQ(report["unlabelled"], half);
+    EXPECT_EQ(report["classes"], 2); // what is shown where the truth is nothing does not count
+    EXPECT_EQ(report["labels"].size(), 2u);
+    EXPECT_NEAR(report["labels"]["building"]["iou"].get<double>(), 2. / 3, 1e-12);
+    EXPECT_NEAR(report["labels"]["car"]["iou"].get<double>(), 2. / 3, 1e-12);
+    EXPECT_EQ(report["labels"]["car"]["true_pixels"], 3 * half);
+    EXPECT_EQ(report["labels"]["car"]["shown_pixels"], 2 * half);
+    EXPECT_NEAR(report["mean_iou"].get<double>(), 2. / 3, 1e-12);
+    EXPECT_NEAR(report["accuracy"].get<double>(), 0.8, 1e-12);
+    EXPECT_EQ(report["confusion"]["car"]["building"], half);
+    EXPECT_FALSE(report["confusion"]["building"].contains("car"));
+    EXPECT_NEAR(report["frames"][1]["mean_iou"].get<double>(), 0.25, 1e-12);
+    const ProgramResult table = eval("labels -q " + folders);
+    EXPECT_TRUE(table.out.starts_with("3 frames, mean IoU 0.6667 of 2 classes, 80.00 % of 960 pixels right\n"))
+        << table.out;
+}
+
+TEST(CliEvalLabels, maps_of_either_side_and_what_cannot_be_compared)
+{
+    const Pictures p;
+    p.put("a/000000.png", 11, 26, kWidth, true); // Cityscapes: building, car
+    p.put("b/000000.png", 2, 13, kWidth, true);
+    const std::string a = p / "a", b = p / "b";
+    const std::string ours = p.folder.put("ours.json", R"({"2": "building", "13": "car"})").string();
+    EXPECT_EQ(json_of(eval("labels --json -q --map cityscapes " + a + " " + a).out)["mean_iou"], 1);
+    EXPECT_EQ(
+        json_of(eval("labels --json -q --map cityscapes --truth-map " + ours + " " + a + " " + b).out)["mean_iou"], 1);
+    EXPECT_EQ(json_of(eval("labels --json -q --truth-map cityscapes " + b + " " + a).out)["mean_iou"], 1);
+    expect_error(eval("labels -q " + a + " " + b), 3, "a': unknown labels: 26 (192 pixels)");
+    expect_error(eval("labels -q " + b + " " + a), 3, "unknown labels: 26 (192 pixels)");
+    p.put("b/000001.png", 2, 13, kWidth, true);
+    expect_error(eval("labels -q " + a + " " + b), 3, "a' has no picture '000001', which '");
+    p.put("wide/000000.png", 2, 13, kWidth + 1, true);
+    p.put("one/000000.png", 2, 13, kWidth, true);
+    expect_error(eval("labels -q " + (p / "one") + " " + (p / "wide")), 3,
+                 "wide/000000.png' is 25 x 16 pixels, expected 24 x 16");
+    p.put("none/000000.png", 255, 255, kWidth, true);
+    expect_error(eval("labels -q " + (p / "one") + " " + (p / "none")), 3, "no pixel of 1 frames has a class in");
+    ASSERT_TRUE(write_png_rgb8(p.folder / "none/000000.png", 1, 1, std::vector<uint8_t>{128, 64, 128}));
+    expect_error(eval("labels -q " + (p / "none") + " " + (p / "one")), 3, "a picture in colour");
 }
 
 // three frames, 0.1 m apart to the right, before a wall at 2 m with a focal length of 20: a pixel each

@@ -12,11 +12,12 @@ struct TapsCase {
     uint32_t batch, height, width, channels, outputs, stride;
     ConvOptions::Taps taps;
 };
-// the rectangles of Inception, and one with padding of its own
+// the rectangles of Inception, one with padding of its own, and the first layer of AlexNet
 const TapsCase kTaps[] = {
-    {1, 1, 1, 3, 5, 1, {1, 1, 0, 0}},   {2, 9, 8, 13, 20, 1, {1, 7, 0, 3}}, {2, 8, 9, 16, 40, 1, {7, 1, 3, 0}},
-    {1, 6, 7, 24, 9, 1, {1, 3, 0, 1}},  {1, 7, 6, 8, 16, 1, {3, 1, 1, 0}},  {2, 7, 11, 11, 72, 1, {5, 5, 2, 2}},
-    {1, 11, 9, 3, 32, 2, {3, 3, 0, 0}}, {2, 10, 9, 9, 8, 1, {3, 3, 0, 0}},  {1, 9, 9, 8, 8, 2, {5, 3, 1, 0}},
+    {1, 1, 1, 3, 5, 1, {1, 1, 0, 0}},      {2, 9, 8, 13, 20, 1, {1, 7, 0, 3}}, {2, 8, 9, 16, 40, 1, {7, 1, 3, 0}},
+    {1, 6, 7, 24, 9, 1, {1, 3, 0, 1}},     {1, 7, 6, 8, 16, 1, {3, 1, 1, 0}},  {2, 7, 11, 11, 72, 1, {5, 5, 2, 2}},
+    {1, 11, 9, 3, 32, 2, {3, 3, 0, 0}},    {2, 10, 9, 9, 8, 1, {3, 3, 0, 0}},  {1, 9, 9, 8, 8, 2, {5, 3, 1, 0}},
+    {2, 33, 22, 3, 17, 4, {11, 11, 2, 2}},
 };
 
 double convolve(const TapsCase& c, const HostImages& x, const HostMatrix& w, uint32_t image, int oy, int ox, uint32_t n,

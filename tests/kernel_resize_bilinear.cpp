@@ -23,7 +23,7 @@ double source(uint32_t i, uint32_t in, uint32_t out)
 }
 
 double resized(const ResizeCase& c, const std::vector<uint8_t>& bytes, uint32_t image, uint32_t y, uint32_t x,
-               uint32_t channel)
+               uint32_t channel, const std::array<float, 3>& shift, const std::array<float, 3>& scale)
 {
     const double v = source(y, c.height, c.out_height), u = source(x, c.width, c.out_width);
     const auto at = [&](uint32_t row, uint32_t col) {
@@ -35,10 +35,11 @@ double resized(const ResizeCase& c, const std::vector<uint8_t>& bytes, uint32_t 
     const double b = v - row, a = u - col;
     const double top = (1 - a) * at(row, col) + a * at(row, col + 1);
     const double bottom = (1 - a) * at(row + 1, col) + a * at(row + 1, col + 1);
-    return 2 * ((1 - b) * top + b * bottom) / 255 - 1;
+    return (2 * ((1 - b) * top + b * bottom) / 255 - 1 - shift[channel]) / scale[channel];
 }
 
-void check(const ResizeCase& c, DType dtype)
+void check(const ResizeCase& c, DType dtype, const std::array<float, 3>& shift = {0, 0, 0},
+           const std::array<float, 3>& scale = {1, 1, 1})
 {
     SCOPED_TRACE(fmt::format("{} x {}x{} -> {}x{} {}", c.images, c.height, c.width, c.out_height, c.out_width,
                              dtype_name(dtype)));
@@ -51,15 +52,16 @@ void check(const ResizeCase& c, DType dtype)
     std::vector<uint32_t> packed(c.images * words, 0xffffffffu);
     for (uint32_t i = 0; i < c.images; ++i)
         std::memcpy(&packed[i * words], &bytes[i * image_bytes], image_bytes);
-    const FeatureMap y =
-        resize_bilinear(k.graph, k.input(packed, words), {c.height, c.width, c.out_height, c.out_width, dtype});
+    const FeatureMap y = resize_bilinear(k.graph, k.input(packed, words),
+                                         {c.height, c.width, c.out_height, c.out_width, dtype, shift, scale});
     const HostImages got{y.height, y.width, k.run(y.data)};
     for (uint32_t i = 0; i < c.images; ++i)
         for (uint32_t p = 0; p < y.pixels(); ++p)
-            for (uint32_t n = 0; n < 3; ++n)
-                ASSERT_NEAR(got.at(i, p / y.width, p % y.width, n), resized(c, bytes, i, p / y.width, p % y.width, n),
-                            dtype == DType::f16 ? 5e-4 : 1e-6)
-                    << "image " << i << " pixel " << p;
+            for (uint32_t n = 0; n < 3; ++n) {
+                const double v = resized(c, bytes, i, p / y.width, p % y.width, n, shift, scale);
+                const double tolerance = 1e-6 / scale[n] + (dtype == DType::f16 ? 5e-4 * std::max(std::abs(v), 1.) : 0);
+                ASSERT_NEAR(got.at(i, p / y.width, p % y.width, n), v, tolerance) << "image " << i << " pixel " << p;
+            }
     k.expect_zero_padding(got.rows);
 }
 
@@ -68,6 +70,12 @@ TEST(kernel_resize_bilinear, matches_interpolation_in_double)
     for (const ResizeCase& c : kCases)
         for (DType dtype : {DType::f32, DType::f16})
             check(c, dtype);
+}
+
+TEST(kernel_resize_bilinear, shifts_and_scales_channels)
+{
+    check({2, 6, 5, 6, 5}, DType::f32, {-.030f, -.088f, -.188f}, {.458f, .448f, .450f});
+    check({1, 31, 18, 7, 9}, DType::f16, {0.5f, 0, -2}, {2, 1, 0.25f});
 }
 
 } // namespace kernel_resize_bilinear_test

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// y = 2 / 255 bilinear(image) - 1: images of bytes [images, H, W, 3] -> y [images, H', W', 3]
+// y = (2 / 255 bilinear(image) - 1 - shift) / scale: images of bytes [images, H, W, 3] -> y [images, H', W', 3]
 #include "kernels/recognition.h"
 
 #include "resize_bilinear.spv.h"
@@ -22,6 +22,12 @@ FeatureMap resize_bilinear(Graph& g, Tensor pixels, const ResizeOptions& o)
     push.out_width = o.out_width;
     push.image_rows = y.image_rows();
     push.y_ld = y.data.ld;
+    push.shift_r = o.shift[0];
+    push.shift_g = o.shift[1];
+    push.shift_b = o.shift[2];
+    push.scale_r = o.scale[0];
+    push.scale_g = o.scale[1];
+    push.scale_b = o.scale[2];
     DispatchOptions dispatch;
     dispatch.banded = {"Y"};
     g.dispatch(kernel::resize_bilinear, {{"Pixels", pixels}, {"Y", y.data}}, push, threads(push.rows),

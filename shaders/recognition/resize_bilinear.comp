@@ -1,7 +1,7 @@
 #version 460
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// y = 2 / 255 bilinear(image) - 1, a pixel a thread. Output pixel i lies at s = max((i + 1/2) in / out - 1/2, 0) of the
+// y = (2 / 255 bilinear(image) - 1 - shift) / scale, a pixel a thread. Output pixel i lies at s = max((i + 1/2) in / out - 1/2, 0) of the
 // input (align_corners = False, no antialiasing), and s = n / d with integers, so that its fraction is exact.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/pack.glsl"
@@ -19,6 +19,12 @@ layout(push_constant) uniform ResizeBilinearPush {
     uint out_width;
     uint image_rows; // rows of an output image
     uint y_ld;
+    float shift_r;
+    float shift_g;
+    float shift_b;
+    float scale_r;
+    float scale_g;
+    float scale_b;
 } p;
 layout(binding = 0) readonly buffer Pixels { uint pixels[]; }; // [images, in_words], four bytes a word: RGB RGB ..
 layout(binding = 1) writeonly buffer Y { uvec4 y[]; };         // [images * image_rows, y_ld]
@@ -58,6 +64,7 @@ void main()
         const vec3 top = mix(texel(image, v.low, u.low), texel(image, v.low, u.high), u.share);
         const vec3 bottom = mix(texel(image, v.high, u.low), texel(image, v.high, u.high), u.share);
         rgb = mix(top, bottom, v.share) / 127.5 - 1.0;
+        rgb = (rgb - vec3(p.shift_r, p.shift_g, p.shift_b)) / vec3(p.scale_r, p.scale_g, p.scale_b);
     }
     STORE8(y, kTypeY, row * p.y_ld, vec4(rgb, 0.0), vec4(0.0));
 }

@@ -277,16 +277,17 @@ std::string_view name_of(std::optional<DepthKind> kind)
     return kind ? std::string_view(kDepthKinds[size_t(*kind)]) : "auto";
 }
 
-void add_depth_options(CLI::App& command, DepthEncoding& e)
+void add_depth_options(CLI::App& command, DepthEncoding& e, const std::string& of)
 {
-    add_choice(command, "--depth-kind", kDepthKinds,
+    const std::string kind = "--" + of + "-kind", scale = "--" + of + "-scale";
+    add_choice(command, kind.c_str(), kDepthKinds,
                "depth along the axis (z), from the camera along each ray (Hypersim, Unreal, Blender), or CARLA's 24 "
                "bits; carla for 8-bit colour pictures, else z",
                [&e](const std::string& word) {
                    e.kind = DepthKind(std::ranges::find(kDepthKinds, word) - kDepthKinds.begin());
                });
     add_number(
-        command, "--depth-scale", e.unit,
+        command, scale, e.unit,
         "metres of one unit of depth; what transforms.json says, else 0.001 (TUM RGB-D: 0.0002, KITTI: 0.00390625), of "
         "fractions in .npy 1",
         1e-6, 10.0);

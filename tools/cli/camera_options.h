@@ -64,8 +64,8 @@ void add_origin(CLI::App& command, std::string& text);
 // bad use for what is not three numbers; 0, 0, 0 where the text is empty
 Result<std::array<double, 3>> origin_from(const std::string& text);
 
-// --depth-kind and --depth-scale: how pictures hold depth
-void add_depth_options(CLI::App& command, DepthEncoding& encoding);
+// --depth-kind and --depth-scale, or of other pictures: how they hold depth
+void add_depth_options(CLI::App& command, DepthEncoding& encoding, const std::string& of = "depth");
 
 std::string_view name_of(std::optional<DepthKind> kind); // "auto" where there is none
 

@@ -178,6 +178,7 @@ int run_program(int argc, char** argv, std::initializer_list<Command> commands)
         app.set_version_flag("--version", kProgram);
         app.allow_windows_style_options(false); // a path may begin with a slash
         app.fallthrough();                      // global options may follow the subcommand
+        app.require_subcommand(0, 1);           // a later word is no command, as in `eval labels`, or a folder `render`
         Globals globals;
         add_globals(app, globals);
         Run run;

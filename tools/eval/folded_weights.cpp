@@ -28,7 +28,7 @@ uint32_t FoldedWeights::add(const std::string& convolution, const std::string& n
 {
     Layer layer{convolution, norm, shape, {}, {}};
     uint32_t& outputs = layer.shape.outputs;
-    for (const std::string& name : {norm + ".running_mean", convolution + ".weight"})
+    for (const std::string& name : {norm + ".running_mean", convolution + ".weight"}) // the latter if there is no norm
         if (const TensorInfo* t = file_.find(name);
             t && !t->shape.empty() && t->shape[0] >= 1 && t->shape[0] <= kMaxOutputs)
             outputs = uint32_t(t->shape[0]);
@@ -36,9 +36,11 @@ uint32_t FoldedWeights::add(const std::string& convolution, const std::string& n
     schema_.push_back({convolution + ".weight", {outputs, inputs, shape.taps.height, shape.taps.width}});
     if (shape.bias)
         schema_.push_back({convolution + ".bias", {outputs}});
-    for (const char* name : {".weight", ".bias", ".running_mean", ".running_var"})
-        schema_.push_back({norm + name, {outputs}});
-    allow(norm + ".num_batches_tracked");
+    if (!norm.empty()) {
+        for (const char* name : {".weight", ".bias", ".running_mean", ".running_var"})
+            schema_.push_back({norm + name, {outputs}});
+        allow(norm + ".num_batches_tracked");
+    }
     const uint32_t depth = shape.taps.height * shape.taps.width * padded(shape.inputs);
     layer.weight = state_.tensor(outputs, depth, DType::f32, convolution + ".weight");
     layer.bias = state_.tensor(1, outputs, DType::f32, convolution + ".bias");
@@ -110,6 +112,18 @@ std::array<WeightLayout, 2> FoldedWeights::layouts_of(const Layer& layer)
 
 Status FoldedWeights::fold(const Layer& layer, bool of_bias, std::vector<float>& values) const
 {
+    std::vector<double> numbers(layer.shape.outputs);
+    if (!of_bias || layer.shape.bias) {
+        SR_TRY(numbers, read(layer.convolution + (of_bias ? ".bias" : ".weight")));
+    }
+    if (!layer.norm.empty())
+        SR_CHECK(apply_norm(layer, of_bias, numbers));
+    values.assign(numbers.begin(), numbers.end());
+    return {};
+}
+
+Status FoldedWeights::apply_norm(const Layer& layer, bool of_bias, std::vector<double>& numbers) const
+{
     const Shape& s = layer.shape;
     SR_TRY(const auto gain, read(layer.norm + ".weight"));
     SR_TRY(const auto variance, read(layer.norm + ".running_var"));
@@ -123,20 +137,13 @@ Status FoldedWeights::fold(const Layer& layer, bool of_bias, std::vector<float>&
     if (of_bias) {
         SR_TRY(const auto beta, read(layer.norm + ".bias"));
         SR_TRY(const auto mean, read(layer.norm + ".running_mean"));
-        std::vector<double> bias(s.outputs);
-        if (s.bias) {
-            SR_TRY(bias, read(layer.convolution + ".bias"));
-        }
-        values.resize(s.outputs);
         for (uint32_t n = 0; n < s.outputs; ++n)
-            values[n] = float((bias[n] - mean[n]) * scale[n] + beta[n]);
+            numbers[n] = (numbers[n] - mean[n]) * scale[n] + beta[n];
         return {};
     }
-    SR_TRY(const auto weight, read(layer.convolution + ".weight"));
-    values.resize(weight.size());
-    const size_t of_output = weight.size() / s.outputs;
-    for (size_t i = 0; i < weight.size(); ++i)
-        values[i] = float(weight[i] * scale[i / of_output]);
+    const size_t of_output = numbers.size() / s.outputs;
+    for (size_t i = 0; i < numbers.size(); ++i)
+        numbers[i] *= scale[i / of_output];
     return {};
 }
 

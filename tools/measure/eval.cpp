@@ -14,6 +14,7 @@ void add_eval(CLI::App& app, const Globals& globals, Run& run)
     eval->require_subcommand(1);
     eval->fallthrough();
     add_eval_chamfer(*eval, globals, run);
+    add_eval_depth(*eval, globals, run);
     add_eval_edges(*eval, globals, run);
     add_eval_f3d(*eval, globals, run);
     add_eval_fid(*eval, globals, run);
@@ -21,6 +22,7 @@ void add_eval(CLI::App& app, const Globals& globals, Run& run)
     add_eval_frames(*eval, globals, run);
     add_eval_instances(*eval, globals, run);
     add_eval_kid(*eval, globals, run);
+    add_eval_labels(*eval, globals, run);
     add_eval_mmd(*eval, globals, run);
     add_eval_points(*eval, globals, run);
     add_eval_seams(*eval, globals, run);

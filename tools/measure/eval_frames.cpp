@@ -1,10 +1,14 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// semrover eval frames FRAMES TRUTH: how alike pictures of equal names are: PSNR and SSIM, also by visibility and class
+// semrover eval frames FRAMES TRUTH: how alike pictures of equal names are: PSNR and SSIM, also by visibility and
+// class, and LPIPS
+#include "runtime/base/hash.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
+#include "tools/cli/open_device.h"
 #include "tools/cli/progress.h"
 #include "tools/eval/frame_similarity.h"
+#include "tools/eval/lpips.h"
 #include "tools/eval/sample_files.h"
 #include "tools/measure/eval.h"
 
@@ -16,7 +20,7 @@ namespace semrover {
 namespace {
 
 struct EvalFramesArguments {
-    std::string frames, truth, visible, labels, map;
+    std::string frames, truth, visible, labels, map, lpips;
 };
 
 struct FrameInputs {
@@ -39,7 +43,40 @@ Result<FrameInputs> list_inputs(const EvalFramesArguments& o)
     return in;
 }
 
-Result<FrameSimilarity> measure_frame(const FrameInputs& in, const std::string& name, PictureClasses& classes)
+// the network of LPIPS, where it is asked for
+struct PerceptualNetwork {
+    std::shared_ptr<Device> device;
+    std::unique_ptr<Lpips> lpips;
+    Json description; // path, kind, hash
+};
+
+Result<PerceptualNetwork> load_network(const std::string& path, const Globals& globals)
+{
+    PerceptualNetwork y;
+    if (path.empty())
+        return y;
+    SR_TRY(const uint64_t hash, hash_file(path));
+    SR_TRY(y.device, open_device(globals));
+    SR_TRY(y.lpips, Lpips::load(*y.device, path));
+    y.description = {{"path", path}, {"kind", y.lpips->backbone()}, {"hash", hash_text(hash)}};
+    return y;
+}
+
+struct FrameFigures {
+    FrameSimilarity similarity;
+    double lpips = 0;
+};
+
+Status check_side(const Path& path, const ImageRgb8& frame, uint32_t least, std::string_view what)
+{
+    if (frame.width < least || frame.height < least)
+        return fail(ErrorCode::bad_input, "{} is {} x {} pixels, expected {} x {} or more, {}", quote_path(path),
+                    frame.width, frame.height, least, least, what);
+    return {};
+}
+
+Result<FrameFigures> measure_frame(const FrameInputs& in, const std::string& name, PictureClasses& classes,
+                                   Lpips* lpips)
 {
     SR_TRY(const ImageRgb8 frame, read_color_frame(in.frames.at(name), {}));
     const ImageSize size{frame.width, frame.height};
@@ -51,10 +88,13 @@ Result<FrameSimilarity> measure_frame(const FrameInputs& in, const std::string& 
     if (!in.labels.empty()) {
         SR_TRY(labels, read_label_frame(in.labels.at(name), size, classes));
     }
-    if (frame.width < kSsimWindow || frame.height < kSsimWindow)
-        return fail(ErrorCode::bad_input, "{} is {} x {} pixels, expected {} x {} or more, the window of SSIM",
-                    quote_path(in.frames.at(name)), size.width, size.height, kSsimWindow, kSsimWindow);
-    return frame_similarity(frame, truth, visible, labels);
+    SR_CHECK(check_side(in.frames.at(name), frame, kSsimWindow, "the window of SSIM"));
+    FrameFigures y{frame_similarity(frame, truth, visible, labels)};
+    if (lpips) {
+        SR_CHECK(check_side(in.frames.at(name), frame, lpips->least_side(), "what the network of LPIPS can see"));
+        SR_TRY(y.lpips, lpips->distance(frame, truth));
+    }
+    return y;
 }
 
 // equal pictures have no finite PSNR: null
@@ -91,18 +131,21 @@ void print_row(std::string_view name, const SimilaritySums& s)
                s.windows ? fmt::format("{:.4f}", s.ssim()) : std::string("-"));
 }
 
-struct FrameMean { // of the frames that are not equal to their truth
-    double psnr = 0;
+struct FrameMean {
+    double psnr = 0; // of the frames that are not equal to their truth
     size_t frames = 0;
+    double lpips = 0; // of all
 };
 
-void print(const FrameInputs& in, const FrameSimilarity& s, const FrameMean& mean)
+void print(const FrameInputs& in, const FrameSimilarity& s, const FrameMean& mean, const Lpips* lpips)
 {
     fmt::print("{} frames, PSNR", in.frames.size());
     if (mean.frames)
         fmt::print(" {:.3f} dB in the mean of {} frames", mean.psnr, mean.frames);
-    fmt::print(", {} equal\n{:13} {:>11} {:>9} {:>8}\n", in.frames.size() - mean.frames, "", "pixels", "PSNR, dB",
-               "SSIM");
+    fmt::print(", {} equal\n", in.frames.size() - mean.frames);
+    if (lpips)
+        fmt::print("LPIPS {:.4f} in the mean ({})\n", mean.lpips, lpips->backbone());
+    fmt::print("{:13} {:>11} {:>9} {:>8}\n", "", "pixels", "PSNR, dB", "SSIM");
     print_row("all", s.all);
     if (!in.visible.empty()) {
         print_row("visible", s.visible);
@@ -113,24 +156,46 @@ void print(const FrameInputs& in, const FrameSimilarity& s, const FrameMean& mea
             print_row(label_name(i), s.labels[i]);
 }
 
+void print_report(const FrameInputs& in, const FrameSimilarity& total, const FrameMean& mean, Json rows,
+                  const PerceptualNetwork& network)
+{
+    Json report = sums_json(total.all);
+    report["metric"] = "frames";
+    report["mean_psnr"] = mean.frames ? Json(mean.psnr) : Json();
+    report["equal_frames"] = in.frames.size() - mean.frames;
+    if (network.lpips) {
+        report["lpips"] = mean.lpips;
+        report["network"] = network.description;
+        report["device"] = network.device->name();
+        report["peak_bytes"] = network.device->peak_bytes();
+    }
+    add_parts(in, total, report);
+    report["frames"] = std::move(rows);
+    fmt::print("{}\n", report.dump());
+}
+
 Status eval_frames(const EvalFramesArguments& o, const Globals& globals)
 {
     SR_TRY(const FrameInputs in, list_inputs(o));
     SR_TRY(PictureClasses classes, PictureClasses::create(o.map));
+    SR_TRY(const PerceptualNetwork network, load_network(o.lpips, globals));
     FrameSimilarity total;
     FrameMean mean;
     Json rows = Json::array();
     Progress progress(progress_to_stderr(globals), "frames", "frames", in.frames.size());
     for (const auto& [name, path] : in.frames) {
-        SR_TRY(const FrameSimilarity s, measure_frame(in, name, classes));
-        total += s;
-        if (std::isfinite(s.all.psnr())) {
-            mean.psnr += s.all.psnr();
+        SR_TRY(const FrameFigures f, measure_frame(in, name, classes, network.lpips.get()));
+        total += f.similarity;
+        if (std::isfinite(f.similarity.all.psnr())) {
+            mean.psnr += f.similarity.all.psnr();
             ++mean.frames;
         }
-        Json& row = rows.emplace_back(sums_json(s.all));
+        mean.lpips += f.lpips;
+        Json& row = rows.emplace_back(sums_json(f.similarity.all));
         row["name"] = printable(name);
-        add_parts(in, s, row);
+        if (network.lpips)
+            row["lpips"] = f.lpips;
+        add_parts(in, f.similarity, row);
         progress.update(rows.size());
         if (interrupt_requested() && rows.size() < in.frames.size())
             return fail(ErrorCode::interrupted, "interrupted after {} of {} frames", rows.size(), in.frames.size());
@@ -138,17 +203,11 @@ Status eval_frames(const EvalFramesArguments& o, const Globals& globals)
     progress.finish();
     SR_CHECK(classes.check(quote_path(o.labels)));
     mean.psnr /= double(std::max<size_t>(mean.frames, 1));
-    if (!globals.json) {
-        print(in, total, mean);
-        return {};
-    }
-    Json report = sums_json(total.all);
-    report["metric"] = "frames";
-    report["mean_psnr"] = mean.frames ? Json(mean.psnr) : Json();
-    report["equal_frames"] = in.frames.size() - mean.frames;
-    add_parts(in, total, report);
-    report["frames"] = std::move(rows);
-    fmt::print("{}\n", report.dump());
+    mean.lpips /= double(rows.size());
+    if (globals.json)
+        print_report(in, total, mean, std::move(rows), network);
+    else
+        print(in, total, mean, network.lpips.get());
     return {};
 }
 
@@ -157,13 +216,15 @@ Status eval_frames(const EvalFramesArguments& o, const Globals& globals)
 void add_eval_frames(CLI::App& eval, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<EvalFramesArguments>();
-    CLI::App* c = eval.add_subcommand("frames", "PSNR and SSIM of pictures against true ones of the same names");
+    CLI::App* c = eval.add_subcommand("frames", "PSNR, SSIM and LPIPS of pictures against true ones of the same names");
     c->add_option("FRAMES", o->frames, "a folder of pictures, or what `refine`, `render` or `streets` wrote")
         ->required();
     c->add_option("TRUTH", o->truth, "likewise: pictures of the same names and sizes")->required();
     c->add_option("--visible", o->visible, "masks of these names: also figures of what is at 128 or above, and below");
     c->add_option("--labels", o->labels, "class numbers of these names, PNG or .npy: also figures of each class");
     c->add_option("--map", o->map, "JSON: label number or name to class, or null for none");
+    c->add_option("--lpips", o->lpips,
+                  "also LPIPS, by this network: safetensors of AlexNet or VGG16 (docs/eval.md has the layout)");
     c->callback([o, &globals, &run] { run = [o, &globals] { return eval_frames(*o, globals); }; });
 }
 
