@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Makes logs in the layout of a data set, of drives that `semrover render --rig --actors --instances --boxes` wrote with
-a lidar: what `run logs` reads, with a truth to compare with (docs/logs.md)."""
+"""Makes logs in the layout of a data set, of drives that `semrover render --rig --actors --instances --boxes` wrote
+with a lidar: what `run logs` reads, with a truth to compare with (docs/logs.md)."""
 import argparse
 import os
 

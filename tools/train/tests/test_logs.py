@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """A drive through a made street, with two cars that pass, in the layout of each data set, and imported again: how far
-poses, lenses, points, labels and pictures are from the truth. `python3 test_logs.py --print` prints what was measured."""
+poses, lenses, points, labels and pictures are from the truth. `python3 test_logs.py --print` prints that."""
 import contextlib
 import functools
 import io
@@ -18,11 +18,14 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from semtrain import made_log
+from semtrain.frames import find_drives
+from semtrain.grids import find_grids, read_grid
 from semtrain.json_file import read_json, write_json
 from semtrain.logs.__main__ import main as run_logs
 from semtrain.logs.boxes import Track, used_picture
 from semtrain.logs.import_drive import OPENGL
-from semtrain.logs.label_table import NOTHING, LabelTable
+from semtrain.logs.kitti360 import read_times
+from semtrain.logs.label_table import NOTHING, SKY, LabelTable
 from semtrain.logs.lens import Mei, OpenCv, Undistortion, rays_of
 from semtrain.logs.made_kitti360 import FISHEYE, fisheye_of
 from semtrain.logs.motion import Motion, rigid, transformed
@@ -81,14 +84,15 @@ class Logs(unittest.TestCase):
     def setUpClass(cls):
         cls.holder = tempfile.TemporaryDirectory()
         street, drive = cls.path("street"), cls.path("clip")
-        semrover("streets", "--seed", 3, "--length", 40, "--points", 4, "--spacing", 1, "--first", 8, "--end-margin", 31,
-                 "-o", street, "--quiet")
+        semrover("streets", "--seed", 3, "--length", 40, "--points", 4, "--spacing", 1, "--first", 8, "--end-margin",
+                 31, "-o", street, "--quiet")
         write_path(cls.path("path.tum"))
         write_json(cls.path("rig.json"), RIG)
         objects = os.path.join(street, "objects.json")
         write_actors(cls.path("actors.json"), objects)
-        semrover("render", os.path.join(street, "truth.sgrid"), "--path", cls.path("path.tum"), "--rig", cls.path("rig.json"),
-                 "--actors", cls.path("actors.json"), "--objects", objects, "--instances", "--boxes", "-o", drive, "--quiet")
+        semrover("render", os.path.join(street, "truth.sgrid"), "--path", cls.path("path.tum"), "--rig",
+                 cls.path("rig.json"), "--actors", cls.path("actors.json"), "--objects", objects, "--instances",
+                 "--boxes", "-o", drive, "--quiet")
         cls.truth = Rendered(drive)
 
     @classmethod
@@ -188,8 +192,9 @@ class Logs(unittest.TestCase):
             lost += (~moves).sum() - (~moves[nearest]).sum()
             standing += (~moves).sum()
         distances = np.concatenate(distances)
-        return {"median": np.median(distances), "largest": distances.max(), "poses": max(poses), "left in": int(left_in),
-                "moving": int(moving), "lost": lost / standing, "labels": [np.concatenate(part) for part in zip(*labels)]}
+        return {"median": np.median(distances), "largest": distances.max(), "poses": max(poses),
+                "left in": int(left_in), "moving": int(moving), "lost": lost / standing,
+                "labels": [np.concatenate(part) for part in zip(*labels)]}
 
     def test_poses_lenses_and_pictures_are_those_of_the_drive(self):
         for layout in LAYOUTS:
@@ -220,9 +225,15 @@ class Logs(unittest.TestCase):
                 self.assertGreater(errors["moving"], 100)
                 self.assertLess(errors["left in"], 0.005 * errors["moving"])  # splats of a car may stand out of its box
                 self.assertLess(errors["lost"], 0.03)
-                parked = [car for car, (name, _, _) in self.truth.things.items() if name == "car" and car not in MOVING]
-                seen = sum(np.isin(scan.points()[:, 7], np.array(parked) + 1).sum() for _, _, scan in self.sweeps(layout))
-                self.assertGreater(seen, 100)
+                parked = [i + 1 for i, (name, _, _) in self.truth.things.items() if name == "car" and i not in MOVING]
+                before = after = 0
+                for sweep, points, scan in self.sweeps(layout):
+                    truth = scan.points()
+                    cars = transformed(scan.end, truth[np.isin(truth[:, 7], parked), :3].astype(float))
+                    kept = transformed(np.array(sweep["end"]), points[:, :3].astype(float)) - self.moved(layout)
+                    before, after = before + len(cars), after + (cKDTree(kept).query(cars)[0] < 1e-3).sum()
+                self.assertGreater(before, 100)
+                self.assertGreater(after, 0.97 * before)
 
     def test_points_have_the_labels_of_the_layout(self):
         for layout in ("pandaset", "nuscenes"):
@@ -239,7 +250,8 @@ class Logs(unittest.TestCase):
         for layout in LAYOUTS:
             hidden = shown = 0
             for entry, sensor, frame in self.pairs(layout):
-                used = np.array(Image.open(os.path.join(self.imported(layout), entry["file_path"].replace("color", "used"))))
+                used = entry["file_path"].replace("color", "used")
+                used = np.array(Image.open(os.path.join(self.imported(layout), used)))
                 cut = (sensor["height"] - SIZE[1]) // 2
                 instances = np.array(Image.open(frame.color.replace("color", "instance")))[cut:cut + SIZE[1]]
                 moves = np.isin(instances, [thing + 1 for thing in MOVING])
@@ -282,9 +294,35 @@ class Logs(unittest.TestCase):
             kept += (has & (truth > 0)).sum() / (truth > 0).sum() / 2 / MOMENTS
         self.assertGreater(kept, 0.9)
 
+    def test_an_empty_line_of_times_lies_between_its_neighbours(self):
+        path = self.path("timestamps.txt")
+        with open(path, "w") as file:
+            file.write("2013-05-28 08:46:02.900000000\n\n2013-05-28 08:46:03.100000512\n")
+        first, second, third = read_times(path)
+        self.assertAlmostEqual(second - first, 0.1, places=6)
+        self.assertAlmostEqual(third - first, 0.200000512, places=6)
+
+    def test_a_distortion_that_somebody_adds_to_pandaset_is_taken_out(self):
+        folder = self.path("distorted")
+        shutil.copytree(self.log("pandaset"), folder)
+        path = os.path.join(folder, "camera", "front_camera", "intrinsics.json")
+        write_json(path, {**read_json(path), "distortion": [-0.2, 0.02, 0, 0, 0]})
+        drive = self.run_logs(folder, self.path("straight"), "--cameras", "front_camera", "--frames", "0:0")
+        frame = read_json(os.path.join(drive, "transforms.json"))["frames"][0]
+        picture = np.array(Image.open(os.path.join(drive, frame["file_path"])))
+        source = np.array(Image.open(os.path.join(folder, "camera", "front_camera", "00.jpg")))
+        lens = self.truth.cameras["front"][0]
+        x, y = 80.5, 32.5  # a pixel's centre, through both lenses
+        a, b = (x - frame["cx"]) / frame["fl_x"], (y - frame["cy"]) / frame["fl_y"]
+        s = a * a + b * b
+        u, v = (lens["f" + k] * of * (1 - 0.2 * s + 0.02 * s * s) + lens["c" + k] for k, of in (("x", a), ("y", b)))
+        self.assertGreater(x - u, 1.5)
+        near = source[int(v) - 1:int(v) + 2, int(u) - 1:int(u) + 2].reshape(-1, 3)
+        self.assertTrue(bool(((picture[32, 80] >= near.min(0)) & (picture[32, 80] <= near.max(0))).all()))
+
     def test_labels_of_a_segmentation_are_taken_with_their_table(self):
         folder, labels = self.log("nuscenes"), self.path("labels")
-        data = [d for d in read_json(os.path.join(folder, "v1.0-trainval", "sample_data.json")) if "/CAM_" in d["filename"]]
+        data = read_json(os.path.join(folder, "v1.0-trainval", "sample_data.json"))
         numbers = LabelTable("cityscapes").first_numbers(0)
         for camera, (sensor, frames) in self.truth.cameras.items():
             own = sorted((d for d in data if f"/CAM_{camera.upper()}/" in d["filename"]), key=lambda d: d["timestamp"])
@@ -319,6 +357,33 @@ class Logs(unittest.TestCase):
             self.run_logs(folder, self.path("mine"))
         self.assertIn("not of this recipe", str(refused.exception))
         self.assertTrue(os.path.isdir(self.path("mine", "drive", "photos")))
+
+    def test_a_clip_with_depth_leads_to_scene_and_pairs_to_train_on(self):
+        out = self.path("pairs")
+
+        def run(*more):
+            quietly(run_logs, [self.log("infinicube"), "-o", out, "-W", "288", "-H", "192", *more])
+        run()
+        grids = find_grids([os.path.join(out, "scene")])
+        self.assertEqual([os.path.basename(path) for path in grids], ["voxfield.sgrid"])
+        self.assertGreater(len(read_grid(grids[0])[0]["cells"]), 50)
+        drives = find_drives(os.path.join(out, "drive"))
+        self.assertEqual([os.path.basename(drive.folder) for drive in drives], ["front", "left"])
+        for drive in drives:
+            self.assertEqual(drive.numbers, list(range(MOMENTS)))
+            self.assertEqual(sorted(drive.of_used), drive.numbers)
+            self.assertEqual(drive.splat_radius(), "auto")
+            self.assertGreater(float((drive.buffer(5) > 0).float().mean()), 0.1)
+            labels = np.array(Image.open(os.path.join(drive.folder, "label", "000005.png")))
+            np.testing.assert_array_equal(drive.visible(5)[0].numpy(), labels != SKY)
+            self.assertTrue(0.05 < (labels == SKY).mean() < 0.8)
+        kept = grids[0], os.path.join(out, "drive", "buffer", "done")
+        times = [os.path.getmtime(path) for path in kept]
+        run()
+        self.assertEqual([os.path.getmtime(path) for path in kept], times)
+        with self.assertRaises(SystemExit) as refused:
+            run("--visible", "splats")
+        self.assertIn("was made with visible sky", str(refused.exception))
 
     def check_refused(self, layout, damage, *words):
         """of a copy of a log that `damage(folder)` changed"""
@@ -357,7 +422,7 @@ class Logs(unittest.TestCase):
             ("nuscenes", removed("v1.0-trainval", "sensor.json"), "sensor.json is missing"),
             ("kitti360", cut("calibration", "calib_cam_to_velo.txt"), "calib_cam_to_velo.txt: expected 12"),
             ("kitti360", cut("data_poses", sequence, "poses.txt"), "poses.txt: expected 13"),
-            ("kitti360", removed("data_3d_raw", sequence, "velodyne_points", "timestamps.txt"), "timestamps.txt is missing"),
+            ("kitti360", removed("data_3d_raw", sequence, "velodyne_points", "timestamps.txt"), "timestamps.txt is"),
             ("kitti360", cut("data_3d_raw", sequence, "velodyne_points", "data", "0000000004.bin"), "0000000004.bin"),
             ("kitti360", cut("data_3d_bboxes", "train", sequence + ".xml"), ".xml: broken XML"),
             ("infinicube", removed("intrinsic", "clip.tar"), "clip.tar is missing"),
@@ -381,7 +446,8 @@ class Lenses(unittest.TestCase):
             return np.stack([127 + 100 * np.sin(3 * x), 127 + 100 * np.sin(3 * y), 127 + 100 * z], -1)
 
         width, height = 720, 360
-        u, v = np.meshgrid((np.arange(width) + 0.5) / width * 2 * np.pi - np.pi, (np.arange(height) + 0.5) / height * np.pi)
+        u, v = np.meshgrid(((np.arange(width) + 0.5) / width * 2 - 1) * np.pi,
+                           (np.arange(height) + 0.5) / height * np.pi)
         around = np.stack([np.sin(v) * np.sin(u), -np.cos(v), np.sin(v) * np.cos(u)], -1)
         panorama = color_of(around).round().astype(np.uint8)
         undistortion = Undistortion(FISHEYE, *SIZE)
@@ -431,7 +497,7 @@ class Lenses(unittest.TestCase):
     def test_a_box_beside_and_behind_the_camera_hides_what_it_covers(self):
         lens, middle = OpenCv(64, 48, 32, 32, 32, 24), np.eye(4)
         ahead = rigid([0, 0, 4], np.eye(3))
-        used = used_picture(middle, lens, [(ahead, np.array([1.0, 1, 1]))])  # its front is at 3 m: 32 / 3 pixels each way
+        used = used_picture(middle, lens, [(ahead, np.ones(3))])  # its front is at 3 m: 32 / 3 pixels each way
         self.assertIn(int((used[24] == 0).sum()), (21, 22, 23))
         self.assertEqual(used_picture(middle, lens, [(rigid([0, 0, -4], np.eye(3)), np.ones(3))]).min(), 255)
         around = used_picture(middle, lens, [(rigid([2, 0, 0], np.eye(3)), np.array([1.0, 1, 5]))])

@@ -56,7 +56,7 @@ def main(arguments=None):
     p.add_argument("drive", metavar="DRIVE", help="a sequence of PandaSet, or the folder of one of the other data sets")
     p.add_argument("-o", "--output", required=True, help="folder for drive/ and scene/")
     p.add_argument("--layout", choices=sorted(LAYOUTS), help="default: found by what DRIVE holds")
-    p.add_argument("--scene", help="scene of nuScenes, sequence of KITTI-360, clip of InfiniCube, where there are several")
+    p.add_argument("--scene", help="which of several scenes of nuScenes, sequences of KITTI-360, clips of InfiniCube")
     p.add_argument("--labels", help="folder with CAMERA/NAME.png for each picture: class numbers of any segmentation")
     p.add_argument("--map", help="table of the class numbers (docs/formats.md §3); ours, or the data set's own")
     p.add_argument("--cameras", type=names, help="names with commas; default: all")

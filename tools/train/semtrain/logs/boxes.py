@@ -36,6 +36,13 @@ class Track(NamedTuple):
         return (self.size * LARGER + MARGIN) / 2
 
 
+def track_of(seen, every):
+    """seen: [(time, pose, size)] in any order -> Track"""
+    seen = sorted(seen, key=lambda box: box[0])
+    return Track(np.max([size for _, _, size in seen], 0),
+                 Motion([time for time, _, _ in seen], [pose for _, pose, _ in seen]), every)
+
+
 def moving_boxes(tracks, first, last):
     """-> [(pose, half its size)] of things that move, at times from `first` to `last`"""
     times = np.unique(np.linspace(first, last, SAMPLES))

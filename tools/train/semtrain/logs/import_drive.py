@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""A Log becomes a drive in our own layout (docs/formats.md §6.2, §6.3, §6.8): pictures of pinholes, labels, what of them
+"""A Log becomes a drive in our own layout (docs/formats.md §6.2, §6.3, §6.8): pictures of pinholes, labels, what
 is trained on, sweeps without what moves."""
 import os
 

@@ -11,10 +11,9 @@ import tarfile
 import numpy as np
 
 from ..pictures import Picture as Member
-from .boxes import Track
+from .boxes import track_of
 from .lens import OpenCv
 from .log import Camera, Log, Picture, chosen
-from .motion import Motion
 from .source import existing, field, read_label_picture, read_picture, same_counts
 
 EVERY = 0.1            # seconds a frame: clips have no times, and Waymo's are of 10 Hz
@@ -35,7 +34,8 @@ def read(folder, scene=None, frames=None):
     names = sorted(name[6:] for name in os.listdir(folder) if re.fullmatch(r"image_[a-z_]+", name))
     if not names:
         raise SystemExit(f"{folder}: no image_CAMERA")
-    return Log([clip.camera(name, frames) for name in names], [], clip.tracks(), clip.files, "waymo")
+    return Log([clip.camera(name, frames) for name in names], [], clip.tracks(), list(dict.fromkeys(clip.files)),
+               "waymo")
 
 
 class Clip:
@@ -63,7 +63,7 @@ class Clip:
         lens = OpenCv(int(intrinsic[4]), int(intrinsic[5]), *intrinsic[:4])
         images, poses = self.members(f"image_{name}"), self.members("pose")
         others = {kind: self.attribute(kind, name) for kind in ("semantic_buffer", "skymask", "voxel_depth_100")}
-        numbers = sorted(int(field_[:6]) for field_ in images if re.fullmatch(rf"[0-9]{{6}}\.image\.{name}\.jpg", field_))
+        numbers = sorted(int(key[:6]) for key in images if re.fullmatch(rf"[0-9]{{6}}\.image\.{name}\.jpg", key))
         same_counts(f"{self.folder}: {name}", {"pictures": len(numbers),
                                                "poses": sum(f".pose.{name}." in key for key in poses)})
         pictures = []
@@ -98,9 +98,9 @@ class Clip:
             for key, member in sorted(self.members(attribute).items()):
                 for thing, about in parse(member, key).items():
                     pose = np.array(field(member.file, about, "object_to_world"), float)
-                    found.setdefault(thing, {})[int(key[:6]) * EVERY] = pose, field(member.file, about, "object_lwh")
-        return [Track(np.max([size for _, size in seen.values()], 0),
-                      Motion(sorted(seen), [seen[t][0] for t in sorted(seen)]), EVERY) for seen in found.values()]
+                    seen = int(key[:6]) * EVERY, pose, field(member.file, about, "object_lwh")
+                    found.setdefault(thing, []).append(seen)
+        return [track_of(seen, EVERY) for seen in found.values()]
 
 
 def parse(member, key):

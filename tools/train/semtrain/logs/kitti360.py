@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """KITTI-360, as its documentation (cvlibs.net/datasets/kitti-360/documentation.php) and its scripts read it:
-github.com/autonomousvision/kitti360Scripts, helpers/project.py, helpers/annotation.py and devkits/accumuLaser, which says
-how points are moved: the scanner turns clockwise, begins behind, and a frame's pose is that at which it looks ahead."""
+github.com/autonomousvision/kitti360Scripts, helpers/project.py, helpers/annotation.py and devkits/accumuLaser, which
+says how points are moved: the scanner turns clockwise, begins behind, and a frame's pose is that at which it looks
+ahead."""
 import glob
 import os
 import re
@@ -10,7 +11,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 
-from .boxes import Track
+from .boxes import track_of
 from .lens import Mei, OpenCv
 from .log import Camera, Log, Picture, Sweep, chosen, points_of
 from .motion import Motion, rigid, transformed
@@ -48,12 +49,15 @@ def read_rows(path, counts):
 
 
 def read_times(path):
-    """[N] seconds; a line a frame"""
+    """[N] seconds; a line a frame. An empty line, as KITTI has some, lies between those around it"""
     try:
-        return np.array([line.strip().replace(" ", "T") for line in read_text(path).splitlines()],
-                        "datetime64[ns]").astype(np.int64) * 1e-9
+        times = np.array([line.strip().replace(" ", "T") for line in read_text(path).splitlines()], "datetime64[ns]")
     except ValueError as error:
         raise SystemExit(f"{path}: {error}") from error
+    known = np.flatnonzero(~np.isnat(times))
+    if not len(known):
+        raise SystemExit(f"{path}: no times")
+    return np.interp(np.arange(len(times)), known, times[known].astype(np.int64) * 1e-9)
 
 
 def square(rows):
@@ -73,6 +77,7 @@ class Sequence:
         self.lidar_to_body = square(self.to_body["image_00"]) @ np.linalg.inv(square(read_numbers(path, read_text(path),
                                                                                                  12)))
         self.raw, self.clouds = (os.path.join(folder, kind, name) for kind in ("data_2d_raw", "data_3d_raw"))
+        self.semantics = os.path.join(folder, "data_2d_semantics", "train", name)
         self.times = self._times_of(os.path.join(self.clouds, "velodyne_points"))
         self.turn = float(np.median(np.diff(self.times))) if len(self.times) > 1 else TURN
         self.motion = Motion(self.times[self.numbers], [self.poses[n] @ self.lidar_to_body for n in self.numbers])
@@ -94,7 +99,7 @@ class Sequence:
         to_body, times, pictures = square(self.to_body[name]) @ turned, self._times_of(folder), []
         for n in numbers:
             path = existing(os.path.join(folder, "data_rect" if upright else "data_rgb", f"{n:010d}.png"))
-            label = os.path.join(self.folder, "data_2d_semantics", "train", self.name, name, "semantic", f"{n:010d}.png")
+            label = os.path.join(self.semantics, name, "semantic", f"{n:010d}.png")
             labels = (lambda label=label: read_label_picture(label)) if os.path.exists(label) else None
             self.files += [path, label]
             pictures.append(Picture(times[n], self.poses[n] @ to_body, path, f"{n:010d}",
@@ -147,10 +152,8 @@ class Sequence:
             frame = int(text_of(found[0], box, "timestamp")) if box.find("transform") is not None else -1
             if 0 <= frame < len(self.times):
                 key = text_of(found[0], box, "semanticId"), text_of(found[0], box, "instanceId")
-                things.setdefault(key, {})[frame] = read_box(found[0], box)
-        return [Track(np.max([size for _, size in seen.values()], 0),
-                      Motion([self.times[n] for n in sorted(seen)], [seen[n][0] for n in sorted(seen)]), self.turn)
-                for seen in things.values()]
+                things.setdefault(key, []).append((self.times[frame], *read_box(found[0], box)))
+        return [track_of(seen, self.turn) for seen in things.values()]
 
 
 def parse_xml(path):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Lenses, as the pixel of a ray (a, b, 1); pixel (c, r) covers [c, c+1) x [r, r+1). Pictures through them become those of
-a pinhole without black borders."""
+"""Lenses, as the pixel of a ray (a, b, 1); pixel (c, r) covers [c, c+1) x [r, r+1). Pictures through them become those
+of a pinhole without black borders."""
 import math
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ import numpy as np
 
 
 class OpenCv(NamedTuple):
-    """a pinhole, or with distortion k1 k2 p1 p2 k3 k4 k5 k6, of which the last may be left out (docs/formats.md §7.2)"""
+    """a pinhole, or with distortion k1 k2 p1 p2 k3 k4 k5 k6, of which the last may lack (docs/formats.md §7.2)"""
     width: int
     height: int
     fx: float
@@ -108,7 +108,7 @@ class Undistortion:
         self.parts = [self._bilinear(x, y) for y in offsets for x in offsets]
 
     def _bilinear(self, dx, dy):
-        """of the points dx, dy from the pixels' centres: which pixel is the first of four, and how much the others count"""
+        """of the points dx, dy from the pixels' centres: the first of four pixels, and how much the others count"""
         w, h = self.lens.width, self.lens.height
         u, v = self.lens.project(*rays_of(self.target, self.x + dx, self.y + dy))
         c, r = (np.clip(np.floor(of - 0.5), 0, side - 2).astype(np.int32) for of, side in ((u, w), (v, h)))

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """A rendered drive as a sequence of KITTI-360 (kitti360.py says where its layout is from). Its poses are half a turn of
-the lidar apart: every other one is that of a frame, and the sweep that ends at the next one has the frame in its middle.
-A panorama becomes the fisheye image_02."""
+the lidar apart: every other one is that of a frame, and the sweep that ends at the next one has the frame in its
+middle. A panorama becomes the fisheye image_02."""
 import os
 
 import numpy as np
@@ -72,7 +72,8 @@ def write_calibration(drive, perspective, panorama, folder):
     write_lines(os.path.join(folder, "calib_cam_to_pose.txt"),
                 [f"image_0{i}: {numbers(to_body.get(f'image_0{i}', np.eye(4))[:3])}" for i in range(4)])
     lidar = np.linalg.inv(BODY) @ drive.lidar_to_vehicle
-    write_lines(os.path.join(folder, "calib_cam_to_velo.txt"), [numbers((np.linalg.inv(lidar) @ to_body["image_00"])[:3])])
+    write_lines(os.path.join(folder, "calib_cam_to_velo.txt"),
+                [numbers((np.linalg.inv(lidar) @ to_body["image_00"])[:3])])
     for i, c in enumerate(perspective):
         s = drive.cameras[c][0]
         rows = [[s["fx"], 0, s["cx"] - FIRST_PIXEL, 0], [0, s["fy"], s["cy"] - FIRST_PIXEL, 0], [0, 0, 1, 0]]
@@ -111,13 +112,12 @@ def directions_of(lens):
     """[h, w, 3] of the pixels' centres, NaN where no ray leads; the distortion is taken back by repeated guesses"""
     x, y = np.meshgrid((np.arange(lens.width) + 0.5 - lens.u0) / lens.gamma1,
                        (np.arange(lens.height) + 0.5 - lens.v0) / lens.gamma2)
-    plain = lens._replace(gamma1=1, gamma2=1, u0=0, v0=0)
     a, b = x, y
     for _ in range(30):
         s = a * a + b * b
         radial = 1 + lens.k1 * s + lens.k2 * s * s
-        a, b = ((x - 2 * plain.p1 * a * b - plain.p2 * (s + 2 * a * a)) / radial,
-                (y - plain.p1 * (s + 2 * b * b) - 2 * plain.p2 * a * b) / radial)
+        a, b = ((x - 2 * lens.p1 * a * b - lens.p2 * (s + 2 * a * a)) / radial,
+                (y - lens.p1 * (s + 2 * b * b) - 2 * lens.p2 * a * b) / radial)
     s = a * a + b * b
     with np.errstate(invalid="ignore"):
         eta = (lens.xi + np.sqrt(1 + (1 - lens.xi ** 2) * s)) / (s + 1)
@@ -133,7 +133,10 @@ def fisheye_of(panorama, sensor):
     u, v = np.where(seen, u, 0), np.clip(np.where(seen, v, 0), 0, sensor["height"] - 1)
     c, r = np.floor(u).astype(int), np.minimum(np.floor(v).astype(int), sensor["height"] - 2)
     right, down = (u - c)[..., None], (v - r)[..., None]
-    at = lambda i, j: panorama[r + i, (c + j) % sensor["width"]].astype(float)
+
+    def at(i, j):
+        return panorama[r + i, (c + j) % sensor["width"]].astype(float)
+
     out = (at(0, 0) * (1 - right) + at(0, 1) * right) * (1 - down) + (at(1, 0) * (1 - right) + at(1, 1) * right) * down
     return np.where(seen[..., None], out.round(), 0).astype(np.uint8)
 

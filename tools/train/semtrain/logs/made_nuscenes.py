@@ -3,8 +3,6 @@
 """nuScenes-lidarseg beside what `semrover dataset export --to nuscenes` wrote: classes of the key frames' points."""
 import os
 
-import numpy as np
-
 from ..json_file import write_json
 from .label_table import LabelTable
 from .nuscenes import LIDAR
@@ -20,8 +18,8 @@ def add_lidarseg(drives, folder):
     numbers, records = LabelTable("nuscenes").first_numbers(0), []
     os.makedirs(os.path.join(folder, "lidarseg", TABLES))
     for scene, drive in zip(scenes, drives):
-        of_scene = sorted((d for d in data if scene_of[d["sample_token"]] == scene["token"]), key=lambda d: d["timestamp"])
-        for d, scan in zip(of_scene, drive.scans):
+        own = [d for d in data if scene_of[d["sample_token"]] == scene["token"]]
+        for d, scan in zip(sorted(own, key=lambda d: d["timestamp"]), drive.scans):
             if d["is_key_frame"]:
                 file = f"lidarseg/{TABLES}/{d['token']}_lidarseg.bin"
                 numbers[scan.points()[:, 6].astype(int)].tofile(os.path.join(folder, file))

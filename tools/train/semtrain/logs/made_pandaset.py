@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from ..json_file import write_json
 from .label_table import LabelTable
 from .motion import transformed
-from .pandaset import LIDAR_AXES, SPINNING, frame_path
+from .pandaset import FIRST_PIXEL, LIDAR_AXES, SPINNING, frame_path
 
 EPOCH = 1557539924.0  # seconds: times of logs are large numbers
 OTHER = 42            # "Other Static Object", for classes that PandaSet has not
@@ -42,9 +42,11 @@ def write_poses(folder, poses, times):
 def write_camera(folder, sensor, frames):
     os.makedirs(folder)
     for number, frame in enumerate(frames):
-        Image.open(frame.color).convert("RGB").save(os.path.join(folder, f"{number:02d}.jpg"), quality=95, subsampling=0)
+        picture = Image.open(frame.color).convert("RGB")
+        picture.save(os.path.join(folder, f"{number:02d}.jpg"), quality=95, subsampling=0)
     write_poses(folder, [f.pose for f in frames], [f.time for f in frames])
-    write_json(os.path.join(folder, "intrinsics.json"), {k: sensor[k] for k in ("fx", "fy", "cx", "cy")})
+    write_json(os.path.join(folder, "intrinsics.json"), {
+        "fx": sensor["fx"], "fy": sensor["fy"], "cx": sensor["cx"] - FIRST_PIXEL, "cy": sensor["cy"] - FIRST_PIXEL})
 
 
 def write_lidar(drive, folder):

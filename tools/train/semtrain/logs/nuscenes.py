@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes of nuScenes v1.0: github.com/nutonomy/nuscenes-devkit, docs/schema_nuscenes.md. Pictures are undistorted. Points
+"""Scenes of nuScenes v1.0, as the schema of github.com/nutonomy/nuscenes-devkit says. Pictures are undistorted. Points
 are as they lie at the sweep's time, its end, and have no times of their own."""
 import glob
 import os
 
 import numpy as np
 
-from .boxes import Track
+from .boxes import track_of
 from .label_table import NOTHING, LabelTable
 from .lens import OpenCv
 from .log import Camera, Log, Picture, Sweep, points_of
@@ -68,10 +68,10 @@ class Scene:
             raise SystemExit(f"{self._path('sample')}: frames are samples 0 to {len(self.samples) - 1}, not {frames}")
         begin = self.samples[first]["timestamp"] if frames else -np.inf
         end = self.samples[last]["timestamp"] if frames else np.inf
-        chosen = {channel: [d for d in data if begin <= d["timestamp"] <= end] for channel, data in self.channels.items()}
-        files = [existing(os.path.join(self.folder, d["filename"])) for channel, data in chosen.items() for d in data
-                 if channel == LIDAR or channel.startswith("CAM_")]
-        cameras = [self._camera(channel, data) for channel, data in sorted(chosen.items()) if channel.startswith("CAM_")]
+        chosen = {channel: [d for d in data if begin <= d["timestamp"] <= end]
+                  for channel, data in sorted(self.channels.items()) if channel == LIDAR or channel.startswith("CAM_")}
+        files = [existing(os.path.join(self.folder, d["filename"])) for data in chosen.values() for d in data]
+        cameras = [self._camera(channel, data) for channel, data in chosen.items() if channel != LIDAR and data]
         segmented = self._segmented()
         return Log(cameras, self._sweeps(chosen[LIDAR], segmented), self._tracks(),
                    files + [segmented[d["token"]] for d in chosen[LIDAR] if d["token"] in segmented])
@@ -93,8 +93,9 @@ class Scene:
         """{token of sample_data: file} of nuScenes-lidarseg, where it is there"""
         if not os.path.exists(self._path("lidarseg")):
             return {}
-        return {r["sample_data_token"]: existing(os.path.join(self.folder, r["filename"])) for r in self._table("lidarseg")
-                if any(r["sample_data_token"] == d["token"] for d in self.channels[LIDAR])}
+        own = {d["token"] for d in self.channels[LIDAR]}
+        return {r["sample_data_token"]: existing(os.path.join(self.folder, r["filename"]))
+                for r in self._table("lidarseg") if r["sample_data_token"] in own}
 
     def _sweeps(self, data, segmented):
         times = [d["timestamp"] * 1e-6 for d in self.channels[LIDAR]]
@@ -126,9 +127,7 @@ class Scene:
                 w, l, h = a["size"]
                 found.setdefault(a["instance_token"], []).append(
                     (times[a["sample_token"]], rigid(a["translation"], a["rotation"]), (l, w, h)))
-        ordered = [sorted(seen, key=lambda box: box[0]) for seen in found.values()]
-        return [Track(np.max([size for _, _, size in seen], 0), Motion([t for t, _, _ in seen], [p for _, p, _ in seen]),
-                      EVERY) for seen in ordered]
+        return [track_of(seen, EVERY) for seen in found.values()]
 
 
 def quarter_turn(mount):

@@ -24,8 +24,8 @@ class Pairs:
     def import_drive(self):
         """OUT/drive but its buffers"""
         o, cameras = self.options, [camera.name for camera in self.log.cameras]
-        about = {"log": digest(self.log.files + self._labels(), state_of(self.log)), "cameras": cameras, "frames": o.frames and list(o.frames),
-                 "size": [o.width, o.height], "map": o.map}
+        about = {"log": digest(self.log.files + self._labels(), state_of(self.log)), "cameras": cameras,
+                 "frames": o.frames and list(o.frames), "size": [o.width, o.height], "map": o.map}
         step(self.drive, about, lambda: write_drive(self.log, self.drive, (o.width, o.height), o.labels, o.map))
 
     def _labels(self):

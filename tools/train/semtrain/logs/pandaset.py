@@ -1,14 +1,15 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 """PandaSet's sequences, as its devkit reads them: github.com/scaleapi/pandaset-devkit, python/pandaset/sensors.py and
-annotations.py. Points are in the world, with a time each."""
+annotations.py. Points are in the world, with a time each. intrinsics.json has no distortion and the devkit projects
+without one; a key `distortion`, k1 k2 p1 p2 k3, that somebody adds to it is taken."""
 import glob
 import os
 import pickle
 
 import numpy as np
 
-from .boxes import Track
+from .boxes import track_of
 from .label_table import NOTHING, LabelTable
 from .lens import OpenCv
 from .log import Camera, Log, Picture, Sweep, chosen, points_of
@@ -17,7 +18,9 @@ from .source import existing, field, read_json, read_picture, same_counts
 
 SPINNING = 0      # of a point's `d`: the lidar on the roof. 1 looks forward, from a place that no file says
 EVERY = 0.1       # seconds between annotations
-LIDAR_AXES = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])  # x right, y forward -> x forward, y left
+FIRST_PIXEL = 0.5  # cx and cy count from its centre (assets/rigs/README.md)
+# x right, y forward -> x forward, y left
+LIDAR_AXES = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 
 
 def is_here(folder):
@@ -64,7 +67,8 @@ def read_camera(folder, count, numbers):
     path = os.path.join(folder, "intrinsics.json")
     intrinsics = read_json(path, dict)
     height, width = read_picture(paths[0]).shape[:2]
-    lens = OpenCv(width, height, *(float(field(path, intrinsics, k)) for k in ("fx", "fy", "cx", "cy")))
+    fx, fy, cx, cy = (float(field(path, intrinsics, k)) for k in ("fx", "fy", "cx", "cy"))
+    lens = OpenCv(width, height, fx, fy, cx + FIRST_PIXEL, cy + FIRST_PIXEL, tuple(intrinsics.get("distortion", ())))
     return Camera(os.path.basename(folder), lens, [
         Picture(times[n], poses[n], paths[n], os.path.basename(paths[n])[:-4], lambda n=n: read_picture(paths[n]))
         for n in numbers])
@@ -116,5 +120,4 @@ def read_tracks(folder, times):
             s, c = np.sin(float(yaw)), np.cos(float(yaw))
             pose = rigid(box[:3], np.array([[-s, -c, 0], [c, -s, 0], [0, 0, 1]]))
             found.setdefault(uuid, []).append((time, pose, box[3:]))
-    return [Track(np.max([size for _, _, size in seen], 0), Motion([t for t, _, _ in seen], [p for _, p, _ in seen]),
-                  EVERY) for seen in found.values()]
+    return [track_of(seen, EVERY) for seen in found.values()]

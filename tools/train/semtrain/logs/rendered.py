@@ -36,8 +36,8 @@ class Scan(NamedTuple):
 
 
 class Rendered:
-    """cameras: {name: (sensor of the rig, [Frame])}; scans: [Scan]; things: {id: (class, size, [Box])}, of each time that
-    some camera sees them; lidar_to_vehicle; poses: [(time, pose)] of the vehicle"""
+    """cameras: {name: (sensor of the rig, [Frame])}; scans: [Scan]; things: {id: (class, size, [Box])}, of each time
+    that some camera sees them; lidar_to_vehicle; poses: [(time, pose)] of the vehicle"""
 
     def __init__(self, folder):
         self.folder = folder
