@@ -84,7 +84,7 @@ class Logs(unittest.TestCase):
     def setUpClass(cls):
         cls.holder = tempfile.TemporaryDirectory()
         street, drive = cls.path("street"), cls.path("clip")
-        semrover("streets", "--seed", 3, "--length", 40, "--points", 4, "--spacing", 1, "--first", 8, "--end-margin",
+        semrover("streets", "--seed", 3, "--length", 40, "--points", 12, "--spacing", 1, "--first", 8, "--end-margin",
                  31, "-o", street, "--quiet")
         write_path(cls.path("path.tum"))
         write_json(cls.path("rig.json"), RIG)
@@ -92,7 +92,7 @@ class Logs(unittest.TestCase):
         write_actors(cls.path("actors.json"), objects)
         semrover("render", os.path.join(street, "truth.sgrid"), "--path", cls.path("path.tum"), "--rig",
                  cls.path("rig.json"), "--actors", cls.path("actors.json"), "--objects", objects, "--instances",
-                 "--boxes", "-o", drive, "--quiet")
+                 "--boxes", "--splat-radius", "auto", "-o", drive, "--quiet")
         cls.truth = Rendered(drive)
 
     @classmethod
@@ -223,7 +223,7 @@ class Logs(unittest.TestCase):
             with self.subTest(layout):
                 errors = self.point_errors(layout)
                 self.assertGreater(errors["moving"], 100)
-                self.assertLess(errors["left in"], 0.005 * errors["moving"])  # splats of a car may stand out of its box
+                self.assertLess(errors["left in"], 0.02 * errors["moving"])  # splats of a car may stand out of its box
                 self.assertLess(errors["lost"], 0.03)
                 parked = [i + 1 for i, (name, _, _) in self.truth.things.items() if name == "car" and i not in MOVING]
                 before = after = 0
@@ -358,32 +358,43 @@ class Logs(unittest.TestCase):
         self.assertIn("not of this recipe", str(refused.exception))
         self.assertTrue(os.path.isdir(self.path("mine", "drive", "photos")))
 
-    def test_a_clip_with_depth_leads_to_scene_and_pairs_to_train_on(self):
-        out = self.path("pairs")
+    def test_depth_and_sweeps_lead_to_a_scene_and_pairs_to_train_on(self):
+        for layout, size, cameras in (("infinicube", (288, 192), ["front", "left"]),
+                                      ("kitti360", SIZE, ["image_00", "image_01"])):
+            out = self.path("pairs", layout)
 
-        def run(*more):
-            quietly(run_logs, [self.log("infinicube"), "-o", out, "-W", "288", "-H", "192", *more])
-        run()
-        grids = find_grids([os.path.join(out, "scene")])
-        self.assertEqual([os.path.basename(path) for path in grids], ["voxfield.sgrid"])
-        self.assertGreater(len(read_grid(grids[0])[0]["cells"]), 50)
-        drives = find_drives(os.path.join(out, "drive"))
-        self.assertEqual([os.path.basename(drive.folder) for drive in drives], ["front", "left"])
-        for drive in drives:
-            self.assertEqual(drive.numbers, list(range(MOMENTS)))
-            self.assertEqual(sorted(drive.of_used), drive.numbers)
-            self.assertEqual(drive.splat_radius(), "auto")
-            self.assertGreater(float((drive.buffer(5) > 0).float().mean()), 0.1)
-            labels = np.array(Image.open(os.path.join(drive.folder, "label", "000005.png")))
-            np.testing.assert_array_equal(drive.visible(5)[0].numpy(), labels != SKY)
-            self.assertTrue(0.05 < (labels == SKY).mean() < 0.8)
-        kept = grids[0], os.path.join(out, "drive", "buffer", "done")
-        times = [os.path.getmtime(path) for path in kept]
-        run()
-        self.assertEqual([os.path.getmtime(path) for path in kept], times)
-        with self.assertRaises(SystemExit) as refused:
-            run("--visible", "splats")
-        self.assertIn("was made with visible sky", str(refused.exception))
+            def run(*more):
+                quietly(run_logs, [self.log(layout), "-o", out, "-W", str(size[0]), "-H", str(size[1]), *more])
+            run()
+            grids = find_grids([os.path.join(out, "scene")])
+            self.assertEqual([os.path.basename(path) for path in grids], ["voxfield.sgrid"])
+            self.assertGreater(len(read_grid(grids[0])[0]["cells"]), 50)
+            drives = find_drives(os.path.join(out, "drive"))
+            self.assertEqual([os.path.basename(drive.folder) for drive in drives], cameras)
+            for drive in drives:
+                self.assertEqual(drive.numbers, list(range(MOMENTS if layout == "infinicube" else MOMENTS // 2)))
+                self.assertEqual(sorted(drive.of_used), drive.numbers)
+                self.assertEqual(drive.splat_radius(), "auto")
+                self.check_buffer(drive, drive.numbers[-1])
+            kept = grids[0], os.path.join(out, "drive", "buffer", "done")
+            times = [os.path.getmtime(path) for path in kept]
+            run()
+            self.assertEqual([os.path.getmtime(path) for path in kept], times)
+            with self.assertRaises(SystemExit) as refused:
+                run("--visible", "splats")
+            self.assertIn("was made with visible sky", str(refused.exception))
+
+    def check_buffer(self, drive, number):
+        """it is like the picture where splats are, and visible what is not sky"""
+        buffer, truth = drive.buffer(number).float(), drive.truth(number).float()
+        covered = (buffer.sum(0) > 60) & (drive.used(number)[0] != 0)
+        self.assertGreater(float(covered.float().mean()), 0.05)
+        near = float((buffer - truth).abs().mean(0)[covered].mean())
+        far = float((buffer - truth.roll(truth.shape[2] // 3, 2)).abs().mean(0)[covered].mean())
+        self.assertLess(near, 0.7 * far)
+        labels = np.array(Image.open(os.path.join(drive.folder, "label", f"{number:06d}.png")))
+        np.testing.assert_array_equal(drive.visible(number)[0].numpy(), labels != SKY)
+        self.assertTrue(0.05 < (labels == SKY).mean() < 0.8)
 
     def check_refused(self, layout, damage, *words):
         """of a copy of a log that `damage(folder)` changed"""

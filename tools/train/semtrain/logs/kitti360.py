@@ -17,8 +17,9 @@ from .log import Camera, Log, Picture, Sweep, chosen, points_of
 from .motion import Motion, rigid, transformed
 from .source import existing, read_floats, read_label_picture, read_numbers, read_picture, read_text
 
-FIRST_PIXEL = 0.5   # KITTI counts from the centre of the first pixel
-TURN = 0.1          # seconds of a sweep, where only one is there
+FIRST_PIXEL = 0.5     # KITTI counts from the centre of the first pixel
+TURN = 0.1            # seconds of a sweep, where only one is there
+SEAM = np.radians(1)  # points as near to the axis behind are left out: of the begin or the end, which cannot be told
 MEI_FIELDS = ("xi", "k1", "k2", "p1", "p2", "gamma1", "gamma2", "u0", "v0")
 
 
@@ -133,7 +134,9 @@ class Sequence:
 
         def points():
             raw = read_floats(path, 4).astype(float)
-            share = 0.5 - np.arctan2(raw[:, 1], raw[:, 0]) / (2 * np.pi)
+            azimuth = np.arctan2(raw[:, 1], raw[:, 0])
+            seen = np.abs(azimuth) < np.pi - SEAM
+            raw, share = raw[seen], 0.5 - azimuth[seen] / (2 * np.pi)
             in_world = transformed(Motion([0, 1], [begin, end]).at(share), raw[:, :3])
             return points_of(transformed(np.linalg.inv(end), in_world), raw[:, 3], 0, share * self.turn * 1e6)
 

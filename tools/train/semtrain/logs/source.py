@@ -43,10 +43,10 @@ def read_numbers(path, text, count):
 
 def read_floats(path, columns):
     """binary float32 [N, columns]"""
-    values = np.fromfile(existing(path), np.float32)
-    if values.size % columns:
-        raise SystemExit(f"{path}: expected rows of {columns} float32, found {os.path.getsize(path)} bytes")
-    return values.reshape(-1, columns)
+    size = os.path.getsize(existing(path))
+    if size % (4 * columns):
+        raise SystemExit(f"{path}: expected rows of {columns} float32, found {size} bytes")
+    return np.fromfile(path, np.float32).reshape(-1, columns)
 
 
 def field(path, record, name):
