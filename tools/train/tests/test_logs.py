@@ -27,7 +27,7 @@ from semtrain.logs.import_drive import OPENGL
 from semtrain.logs.kitti360 import read_times
 from semtrain.logs.label_table import NOTHING, SKY, LabelTable
 from semtrain.logs.lens import Mei, OpenCv, Undistortion, rays_of
-from semtrain.logs.made_kitti360 import FISHEYE, fisheye_of
+from semtrain.logs.made_kitti360 import fisheye_of, write_fisheye
 from semtrain.logs.motion import Motion, rigid, transformed
 from semtrain.logs.rendered import Rendered
 from semtrain.program import semrover
@@ -294,6 +294,33 @@ class Logs(unittest.TestCase):
             kept += (has & (truth > 0)).sum() / (truth > 0).sum() / 2 / MOMENTS
         self.assertGreater(kept, 0.9)
 
+    def test_a_fisheye_becomes_a_pinhole_of_90_degrees(self):
+        """a smooth panorama, through KITTI-360's fisheye and imported, is what a pinhole sees of it"""
+        def color_of(ray):
+            x, y, z = np.moveaxis(ray / np.linalg.norm(ray, axis=-1, keepdims=True), -1, 0)
+            return np.stack([127 + 100 * np.sin(3 * x), 127 + 100 * np.sin(3 * y), 127 + 100 * z], -1)
+
+        width, height = 720, 360
+        u, v = np.meshgrid(((np.arange(width) + 0.5) / width * 2 - 1) * np.pi,
+                           (np.arange(height) + 0.5) / height * np.pi)
+        around = np.stack([np.sin(v) * np.sin(u), -np.cos(v), np.sin(v) * np.cos(u)], -1)
+        fisheye = fisheye_of(color_of(around).round().astype(np.uint8), {"width": width, "height": height})
+        folder = self.path("fisheye")
+        shutil.copytree(self.log("kitti360"), folder)
+        write_fisheye(os.path.join(folder, "calibration", "image_02.yaml"))
+        raw = os.path.join(folder, "data_2d_raw", "2013_05_28_drive_0000_sync")
+        os.makedirs(os.path.join(raw, "image_02", "data_rgb"))
+        shutil.copy(os.path.join(raw, "image_00", "timestamps.txt"), os.path.join(raw, "image_02"))
+        Image.fromarray(fisheye).save(os.path.join(raw, "image_02", "data_rgb", "0000000004.png"))
+        drive = self.run_logs(folder, self.path("round"), "--cameras", "image_00,image_02", "--frames", "4:4")
+        frame = read_json(os.path.join(drive, "transforms.json"))["frames"][1]
+        picture = np.array(Image.open(os.path.join(drive, frame["file_path"])))
+        self.assertEqual(frame["file_path"], "image_02/color/000000.png")
+        self.assertAlmostEqual(2 * np.degrees(np.arctan(SIZE[0] / 2 / frame["fl_x"])), 90)
+        x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)
+        a, b = (x - frame["cx"]) / frame["fl_x"], (y - frame["cy"]) / frame["fl_y"]
+        self.assertGreater(psnr(picture, color_of(np.stack([a, b, np.ones_like(a)], -1))), 45)
+
     def test_an_empty_line_of_times_lies_between_its_neighbours(self):
         path = self.path("timestamps.txt")
         with open(path, "w") as file:
@@ -396,6 +423,14 @@ class Logs(unittest.TestCase):
         np.testing.assert_array_equal(drive.visible(number)[0].numpy(), labels != SKY)
         self.assertTrue(0.05 < (labels == SKY).mean() < 0.8)
 
+    def test_frames_of_nuscenes_are_samples(self):
+        drive = self.run_logs(self.log("nuscenes"), self.path("sample"), "--frames", "1:1", "--cameras", "CAM_FRONT")
+        times = [frame["time"] for frame in read_json(os.path.join(drive, "transforms.json"))["frames"]]
+        self.assertEqual(len(times), 2)  # that of the sample, and the one 0.05 s before
+        with self.assertRaises(SystemExit) as refused:
+            self.run_logs(self.log("nuscenes"), self.path("samples"), "--frames", "1:2")
+        self.assertIn("frames are samples 0 to 1", str(refused.exception))
+
     def check_refused(self, layout, damage, *words):
         """of a copy of a log that `damage(folder)` changed"""
         broken = self.path("broken")
@@ -450,23 +485,6 @@ class Logs(unittest.TestCase):
 
 
 class Lenses(unittest.TestCase):
-    def test_a_fisheye_becomes_a_pinhole_of_90_degrees(self):
-        """a smooth panorama through the fisheye and back is what a pinhole sees of it"""
-        def color_of(ray):
-            x, y, z = np.moveaxis(ray / np.linalg.norm(ray, axis=-1, keepdims=True), -1, 0)
-            return np.stack([127 + 100 * np.sin(3 * x), 127 + 100 * np.sin(3 * y), 127 + 100 * z], -1)
-
-        width, height = 720, 360
-        u, v = np.meshgrid(((np.arange(width) + 0.5) / width * 2 - 1) * np.pi,
-                           (np.arange(height) + 0.5) / height * np.pi)
-        around = np.stack([np.sin(v) * np.sin(u), -np.cos(v), np.sin(v) * np.cos(u)], -1)
-        panorama = color_of(around).round().astype(np.uint8)
-        undistortion = Undistortion(FISHEYE, *SIZE)
-        picture = undistortion.picture(fisheye_of(panorama, {"width": width, "height": height}), "here")
-        lens = undistortion.target
-        self.assertAlmostEqual(2 * np.degrees(np.arctan(SIZE[0] / 2 / lens.fx)), 90)
-        a, b = rays_of(lens, undistortion.x, undistortion.y)
-        self.assertGreater(psnr(picture, color_of(np.stack([a, b, np.ones_like(a)], -1))), 45)
 
     def test_the_fisheye_is_that_of_kitti_360s_scripts(self):
         """their formula without the tangential part, which they leave out"""

@@ -81,13 +81,16 @@ def write_calibration(drive, perspective, panorama, folder):
                   f"P_rect_0{i}: {numbers(rows)}"]
     write_lines(os.path.join(folder, "perspective.txt"), lines)
     if panorama:
-        value = {**FISHEYE._asdict(), "u0": FISHEYE.u0 - FIRST_PIXEL, "v0": FISHEYE.v0 - FIRST_PIXEL}
-        groups = {"mirror": MEI_FIELDS[:1], "distortion": MEI_FIELDS[1:5], "projection": MEI_FIELDS[5:]}
-        write_lines(os.path.join(folder, "image_02.yaml"), [
-            "%YAML:1.0", "---", "model_type: MEI", "camera_name: image_02", f"image_width: {SIDE}",
-            f"image_height: {SIDE}",
-            *(line for group, keys in groups.items()
-              for line in (f"{group}_parameters:", *(f"   {key}: {value[key]!r}" for key in keys)))])
+        write_fisheye(os.path.join(folder, "image_02.yaml"))
+
+
+def write_fisheye(path):
+    value = {**FISHEYE._asdict(), "u0": FISHEYE.u0 - FIRST_PIXEL, "v0": FISHEYE.v0 - FIRST_PIXEL}
+    groups = {"mirror": MEI_FIELDS[:1], "distortion": MEI_FIELDS[1:5], "projection": MEI_FIELDS[5:]}
+    write_lines(path, ["%YAML:1.0", "---", "model_type: MEI", "camera_name: image_02", f"image_width: {SIDE}",
+                       f"image_height: {SIDE}", *(
+                           line for group, keys in groups.items() for line in
+                           (f"{group}_parameters:", *(f"   {key}: {value[key]!r}" for key in keys)))])
 
 
 def write_pictures(camera, pattern, name, times):

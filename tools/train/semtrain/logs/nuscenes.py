@@ -15,8 +15,9 @@ from .motion import Motion, rigid, transformed
 from .source import existing, field, read_floats, read_json, read_picture, same_counts
 
 LIDAR = "LIDAR_TOP"
-EVERY = 0.5   # seconds between annotations
-TURN = 0.05   # seconds of a sweep, where only one is there
+EVERY = 0.5    # seconds between annotations
+TURN = 0.05    # seconds of a sweep, where only one is there
+APART = 60000  # microseconds by which pictures of a sample may be before or behind its sweep
 
 
 def is_here(folder):
@@ -66,8 +67,8 @@ class Scene:
         first, last = frames or (0, len(self.samples) - 1)
         if not 0 <= first <= last < len(self.samples):
             raise SystemExit(f"{self._path('sample')}: frames are samples 0 to {len(self.samples) - 1}, not {frames}")
-        begin = self.samples[first]["timestamp"] if frames else -np.inf
-        end = self.samples[last]["timestamp"] if frames else np.inf
+        begin = self.samples[first]["timestamp"] - APART if frames else -np.inf
+        end = self.samples[last]["timestamp"] + APART if frames else np.inf
         chosen = {channel: [d for d in data if begin <= d["timestamp"] <= end]
                   for channel, data in sorted(self.channels.items()) if channel == LIDAR or channel.startswith("CAM_")}
         files = [existing(os.path.join(self.folder, d["filename"])) for data in chosen.values() for d in data]
