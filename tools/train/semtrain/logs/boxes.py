@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from PIL import Image, ImageDraw
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from .motion import Motion, transformed
 
@@ -52,8 +52,11 @@ def moving_boxes(tracks, first, last):
 def in_boxes(points, boxes):
     """[N, 3] in the world -> bool [N]"""
     out = np.zeros(len(points), bool)
+    if not boxes or not len(points):
+        return out
+    tree = cKDTree(points, balanced_tree=False)
     for pose, half in boxes:
-        near = np.flatnonzero(np.abs(points - pose[:3, 3]).max(1) <= np.linalg.norm(half))
+        near = np.array(tree.query_ball_point(pose[:3, 3], np.linalg.norm(half)), int)
         own = (points[near] - pose[:3, 3]) @ pose[:3, :3]
         out[near] |= (np.abs(own) <= half).all(1)
     return out
