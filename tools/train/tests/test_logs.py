@@ -205,6 +205,23 @@ class Logs(unittest.TestCase):
                 self.assertLess(errors["pixels"], 1e-6)
                 self.assertGreater(errors["psnr"], 90 if layout == "kitti360" else 30)  # the others have JPEGs
 
+    def test_the_program_reads_the_same_poses(self):
+        """PandaSet's poses.json and KITTI-360's cam0_to_world.txt, which it knows by itself"""
+        poses = "data_poses/2013_05_28_drive_0000_sync/cam0_to_world.txt"
+        for layout, path, camera in (("pandaset", "camera/front_camera/poses.json", "front_camera"),
+                                     ("kitti360", poses, "image_00")):
+            out = self.path(layout + ".tum")
+            semrover("convert", os.path.join(self.log(layout), path), out, "--quiet")
+            rows = np.loadtxt(out)
+            own = [e for e in read_json(os.path.join(self.imported(layout), "transforms.json"))["frames"]
+                   if e["camera"] == camera]
+            self.assertEqual(len(rows), len(own))
+            for row, entry in zip(rows, own):
+                pose = np.array(entry["transform_matrix"]) @ OPENGL
+                np.testing.assert_allclose(row[1:4], pose[:3, 3], atol=1e-6)
+                turned = Rotation.from_quat(row[4:]).as_matrix()
+                np.testing.assert_allclose(turned, pose[:3, :3], atol=1e-6)
+
     def test_pictures_of_a_log_at_its_own_size_keep_their_pixels(self):
         picture = np.array(Image.open(os.path.join(self.log("pandaset"), "camera", "front_camera", "03.jpg")))
         own = np.array(Image.open(os.path.join(self.imported("pandaset"), "front_camera", "color", "000003.png")))

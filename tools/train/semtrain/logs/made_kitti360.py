@@ -41,8 +41,11 @@ def write(drive, output, number):
         write_pictures(drive.cameras[camera], os.path.join(output, "{}", name, target), target, frames)
     write_clouds(scans, os.path.join(output, "data_3d_raw", name, "velodyne_points"), frames)
     write_boxes(drive.things, frames, os.path.join(output, "data_3d_bboxes", "train", name + ".xml"))
-    write_lines(os.path.join(output, "data_poses", name, "poses.txt"),
+    poses = os.path.join(output, "data_poses", name)
+    write_lines(os.path.join(poses, "poses.txt"),
                 [f"{FIRST + i} {numbers((drive.poses[2 * i][1] @ BODY)[:3])}" for i in range(len(frames))])
+    write_lines(os.path.join(poses, "cam0_to_world.txt"),
+                [f"{FIRST + i} {numbers(drive.cameras[perspective[0]][1][2 * i].pose)}" for i in range(len(frames))])
 
 
 def numbers(values):
