@@ -13,10 +13,10 @@ import torch
 from torch import nn
 
 from . import empty_prompt, model_folder, safetensors_file, settings
-from .denoising import alphas_cumprod, ddim_timesteps, denoise, input_of, noise_of, scheduler_of
+from .denoising import alphas_cumprod, ddim_timesteps, denoise, input_of, mean_of_used, noise_of, scheduler_of
 from .draws import draws, generator, number_below, timesteps_at
 from .frames import find_drives, splats_of, to_pixels, write_beside
-from .latents import crop_of, load_vae, sequences
+from .latents import crop_of, load_vae, sequences, used_of
 from .nets.unet import UNet2DConditionModel
 from .trainer import Trainer
 
@@ -43,11 +43,11 @@ class Batches:
     def __init__(self, all_sequences, config):
         self.config = config
         self.frames = [(s, i) for s in all_sequences for i in range(len(s))]
-        self.crop = crop_of(config, all_sequences)
+        self.crop, self.masked = crop_of(config, all_sequences), any(s.used is not None for s in all_sequences)
 
     def make(self, step, part=None):
-        """-> truth, previous (with noise on it, or zeros), buffer [B, 4, h, w], visible [B, 1, h, w]; of `part` alone,
-        a range of the batch"""
+        """-> truth, previous (with noise on it, or zeros), buffer [B, 4, h, w], visible, and used where a sequence has it
+        [B, 1, h, w]; of `part` alone, a range of the batch"""
         draw, rows = generator(self.config, step), []
         for _ in range(self.config["batch"]):
             sequence, i = self.frames[number_below(len(self.frames), draw)]
@@ -67,7 +67,8 @@ class Batches:
             visible = torch.zeros_like(visible)
         elif chance >= self.config["dropout"] + self.config["first_share"] and not s.first[i]:
             previous = s.truth[i - 1][place] + (low + (high - low) * scale) * noise
-        return s.truth[i][place], previous, s.buffer[i][place], visible
+        frame = s.truth[i][place], previous, s.buffer[i][place], visible
+        return (*frame, used_of(s, i)[place]) if self.masked else frame
 
 
 def draw_timesteps(n, config, draw):
@@ -86,13 +87,14 @@ def draw_timesteps(n, config, draw):
 
 def step_loss(model, batch, alphas, config, random):
     """random: Draws -> loss, {eps: the plain error of the noise}"""
-    truth, previous, buffer, visible = batch
+    truth, previous, buffer, visible, *used = batch
     t = random.of_part(draw_timesteps(random.batch, config, random.random))
     noise = random.normal(truth.shape[1:]).to(truth.device)
     a = alphas[t].view(-1, 1, 1, 1).to(truth.device)
     noisy = a.sqrt() * truth + (1 - a).sqrt() * noise
     made = model(noisy, previous, buffer, visible, t.to(truth.device)).float()
-    error = (noise_of(made, noisy, a, config["prediction_type"]) - noise).square().mean((1, 2, 3))
+    squares = (noise_of(made, noisy, a, config["prediction_type"]) - noise).square()
+    error = mean_of_used(squares, *used or [None])
     weight = 1 / a.flatten() if config["weighting"] == "v" else torch.ones_like(error)
     return (weight * error).mean(), {"eps": float(error.mean())}
 

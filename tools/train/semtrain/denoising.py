@@ -20,6 +20,14 @@ def block_shares(visible, block=8):
     return F.avg_pool2d(visible, block)
 
 
+def mean_of_used(squares, used):
+    """[B, ...] -> [B]: the mean over all, or for `used` [B, ..., 1, h, w] over what is 1 there; of nothing it is 0"""
+    axes = tuple(range(1, squares.dim()))
+    if used is None:
+        return squares.mean(axes)
+    return (squares * used).sum(axes) / used.expand_as(squares).sum(axes).clamp(min=1)
+
+
 def input_of(noisy, previous, buffer, visible):
     """latents [B, 4, h, w] each, visible [B, 1, h, w] -> the UNet's 13 channels, in the engine's order"""
     return torch.cat([noisy, previous, buffer, visible], 1)

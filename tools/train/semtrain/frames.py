@@ -7,10 +7,12 @@ A drive is a folder anywhere below the root, its frames numbered in the order in
     buffer/color/000000.png     splats over black, RGB; likewise
     buffer/visible/000000.png   grey: 0 where there is no splat
     label/000000.png            class numbers, for `inception` alone
+    used/000000.png             where it is there: 0 for pixels that `asd` and `vsd` are not trained on; `run logs`
+                                leaves out what moves
     buffer/splats.json          how large the splats were, {"splat_radius": "auto" or metres}; `run drives` writes it
 `semrover streets --images` writes the first and the labels, `semrover render GRID --path transforms.json -o buffer` the
-others. Of a rig each camera is a drive: CAMERA/color, CAMERA/label, buffer/CAMERA/color, buffer/CAMERA/visible. Any of
-these folders may be in a shard set.
+others. Of a rig each camera is a drive: CAMERA/color, CAMERA/label, CAMERA/used, buffer/CAMERA/color,
+buffer/CAMERA/visible. Any of these folders may be in a shard set.
 """
 import os
 
@@ -32,8 +34,9 @@ class Drive:
     """One as above, or one camera's; a frame that lacks one of the three pictures is left out, and begins a new
     sequence. The arguments are {number: Picture}, and the folder that has splats.json"""
 
-    def __init__(self, folder, truths, buffers, visible, labels, of_buffers):
-        self.folder, self.parts, self.labels, self.of_buffers = folder, (truths, buffers, visible), labels, of_buffers
+    def __init__(self, folder, truths, buffers, visible, labels, used, of_buffers):
+        self.folder, self.parts, self.of_buffers = folder, (truths, buffers, visible), of_buffers
+        self.labels, self.of_used = labels, used
         self.numbers = sorted(set(truths) & set(buffers) & set(visible))
 
     def truth(self, number):
@@ -46,15 +49,24 @@ class Drive:
 
     def visible(self, number):
         """-> float [1, H, W], 0 or 1"""
-        with self.parts[2][number].open() as image:
-            return torch.from_numpy(np.array(image.convert("L")) != 0).float()[None]
+        return read_mask(self.parts[2][number])
+
+    def used(self, number):
+        """-> float [1, H, W], 0 or 1, or None: all"""
+        return read_mask(self.of_used[number]) if number in self.of_used else None
+
+    def used_truth(self, number):
+        """`truth`, and the buffer where it is not used: a network that sees around a pixel sees nothing of what is left
+        out"""
+        used = self.used(number)
+        return self.truth(number) if used is None else torch.where(used != 0, self.truth(number), self.buffer(number))
 
     def has_previous(self, number):
         return all(number - 1 in part for part in self.parts)
 
     def pictures(self, numbers):
         """the Pictures of these frames"""
-        return [part[n] for part in self.parts for n in numbers]
+        return [part[n] for part in (*self.parts, self.of_used) for n in numbers if n in part]
 
     def splat_radius(self):
         """of the buffers: "auto", metres, or None where nothing says it"""
@@ -64,15 +76,15 @@ class Drive:
 
 def find_drives(root):
     """all drives below root that have frames, sorted by path"""
-    found, drives = pictures_below(root, ("color", "visible", "label")), []
+    found, drives = pictures_below(root, ("color", "visible", "label", "used")), []
     for color in sorted(found, key=lambda path: path.split(os.sep)):
         folder, name = os.path.split(color)
         of_all, camera = os.path.split(folder)
         for of_buffers, inner in ((os.path.join(folder, "buffer"), ""), (os.path.join(of_all, "buffer"), camera)):
             buffers, visible = (found.get(os.path.join(of_buffers, inner, part)) for part in ("color", "visible"))
             if name == "color" and buffers and visible:
-                labels = found.get(os.path.join(folder, "label"), {})
-                drives.append(Drive(folder, found[color], buffers, visible, labels, of_buffers))
+                labels, used = (found.get(os.path.join(folder, part), {}) for part in ("label", "used"))
+                drives.append(Drive(folder, found[color], buffers, visible, labels, used, of_buffers))
                 break
     drives = [drive for drive in drives if drive.numbers]
     if not drives:
@@ -115,6 +127,12 @@ def read_rgb(picture):
     """of a Picture -> uint8 [3, H, W]"""
     with picture.open() as image:
         return torch.from_numpy(np.array(image.convert("RGB"))).permute(2, 0, 1).contiguous()
+
+
+def read_mask(picture):
+    """of a Picture -> float [1, H, W]: 0 where it is black, else 1"""
+    with picture.open() as image:
+        return torch.from_numpy(np.array(image.convert("L")) != 0).float()[None]
 
 
 def to_floats(pixels):

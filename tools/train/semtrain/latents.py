@@ -42,15 +42,23 @@ class Joined:
 
 
 class Sequence:
-    """a drive as the denoiser sees it: truth, buffer [F, 4, h, w], visible [F, 1, h, w], first [F]: nothing before"""
+    """a drive as the denoiser sees it: truth, buffer [F, 4, h, w], visible [F, 1, h, w], first [F]: nothing before; used
+    [F, 1, h, w], 1 where all pixels of a block are trained on, or None: everywhere"""
 
     def __init__(self, files, first):
         """files: {name: tensor} of FRAMES frames each, the last one of what is left"""
         self.truth, self.buffer, self.visible = (Joined([f[n] for f in files]) for n in ("truth", "buffer", "visible"))
-        self.first = first
+        self.first, self.used = first, None
+        if any("used" in f for f in files):
+            self.used = Joined([f["used"] if "used" in f else torch.ones_like(f["visible"]) for f in files])
 
     def __len__(self):
         return len(self.first)
+
+
+def used_of(sequence, which):
+    """`used` of a frame or of a range of them"""
+    return torch.ones_like(sequence.visible[which]) if sequence.used is None else sequence.used[which]
 
 
 def crop_of(config, all_sequences):
@@ -66,13 +74,20 @@ class Encoder:
 
     @torch.no_grad()
     def encode(self, drive, numbers, flip):
-        """-> {truth, buffer, visible} of frames of a drive, or of their mirror images"""
+        """-> {truth, buffer, visible, and used where a frame has it} of frames of a drive, or of their mirror images"""
         if not self.vae:
             with torch.random.fork_rng(devices=[]):
                 self.vae = load_vae(self.folder).to(self.device)
-        rows = {"truth": [], "buffer": [], "visible": []}
+        rows, masked = {"truth": [], "buffer": [], "visible": []}, any(n in drive.of_used for n in numbers)
+        if masked:
+            rows["used"] = []
+
+        def read(n):
+            frame = drive.used_truth(n), drive.buffer(n), drive.visible(n)
+            return (*frame, drive.used(n) if n in drive.of_used else torch.ones_like(frame[2])) if masked else frame
+
         with ThreadPoolExecutor(4) as pool:  # reads while the device encodes
-            frames = pool.map(lambda n: (drive.truth(n), drive.buffer(n), drive.visible(n)), numbers)
+            frames = pool.map(read, numbers)
             for _ in range(0, len(numbers), self.batch):
                 batch = [torch.stack(part) for part in zip(*islice(frames, self.batch))]
                 for name, pictures in zip(rows, batch):
@@ -80,10 +95,14 @@ class Encoder:
         return {name: torch.cat(values) for name, values in rows.items()}
 
     def _encode(self, name, pictures, flip):
-        pictures = pictures if name == "visible" else to_floats(pictures)
+        mask = name in ("visible", "used")
+        pictures = pictures if mask else to_floats(pictures)
         filled = fill_blocks(pictures, self.vae.downscale)  # before it is mirrored: blocks begin at the left
         filled = filled.flip(3) if flip else filled
-        return block_shares(filled, self.vae.downscale) if name == "visible" else self.vae.encode_scaled(filled)
+        if not mask:
+            return self.vae.encode_scaled(filled)
+        shares = block_shares(filled, self.vae.downscale)
+        return shares if name == "visible" else (shares == 1).float()
 
 
 def sequences(vae_folder, drives, cache, config, mirrored=True):

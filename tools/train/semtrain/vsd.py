@@ -14,9 +14,10 @@ import torch
 from torch import nn
 
 from . import model_folder, safetensors_file, settings
+from .denoising import mean_of_used
 from .draws import draws, generator, number_below
 from .frames import find_drives, splats_of, to_pixels, write_beside
-from .latents import crop_of, load_vae, sequences
+from .latents import crop_of, load_vae, sequences, used_of
 from .nets.video_unet import UNetSpatioTemporalConditionModel
 from .trainer import Trainer
 from .video_denoising import (SCHEDULER, denoise_window, timestep_of, velocity_target, video_input, window_denoiser)
@@ -57,10 +58,11 @@ class Batches:
                        if not any(s.first[i + 1:i + self.frames])]
         if not self.starts:
             raise SystemExit(f"no drive has {self.frames} frames in a row; --set num_frames=N takes shorter windows")
-        self.crop = crop_of(config, all_sequences)
+        self.crop, self.masked = crop_of(config, all_sequences), any(s.used is not None for s in all_sequences)
 
     def make(self, step, part=None):
-        """-> truth, buffer [B, F, 4, h, w], visible [B, F, 1, h, w]; of `part` alone, a range of the batch"""
+        """-> truth, buffer [B, F, 4, h, w], visible, and used where a sequence has it [B, F, 1, h, w]; of `part` alone, a
+        range of the batch"""
         draw, rows = generator(self.config, step), []
         for _ in range(self.config["batch"]):
             sequence, i = self.starts[number_below(len(self.starts), draw)]
@@ -75,18 +77,19 @@ class Batches:
         truth, buffer, visible = (of[i:i + self.frames][place] for of in (s.truth, s.buffer, s.visible))
         if float(torch.rand(1, generator=draw)) < self.config["dropout"]:
             visible = torch.zeros_like(visible)
-        return truth, unscaled(buffer, self.vae_config), visible
+        window = truth, unscaled(buffer, self.vae_config), visible
+        return (*window, used_of(s, slice(i, i + self.frames))[place]) if self.masked else window
 
 
 def step_loss(model, batch, config, random):
     """random: Draws; log sigma is normal -> loss, {low: the error of the velocity at sigma below 1}"""
-    truth, buffer, visible = batch
+    truth, buffer, visible, *used = batch
     sigma = torch.exp(config["sigma_mean"] + config["sigma_deviation"] * random.normal())
     sigma = sigma.clamp(SCHEDULER["sigma_min"], SCHEDULER["sigma_max"]).to(truth.device)
     noise = random.normal(truth.shape[1:]).to(truth.device)
     level = sigma.view(-1, 1, 1, 1, 1)
     made = model(truth + level * noise, buffer, visible, sigma).float()
-    error = (made - velocity_target(truth, noise, level)).square().mean((1, 2, 3, 4))
+    error = mean_of_used((made - velocity_target(truth, noise, level)).square(), *used or [None])
     low = error[sigma < 1]
     return error.mean(), {"low": float(low.mean() if len(low) else error.mean())}
 
