@@ -65,7 +65,7 @@ Measured measure(const FusionFolder& folder, double max_depth)
     m.within = percentile(distances, 0.95);
     m.labels = double(right) / double(m.faces);
     m.colors = double(colored) / double(mesh.positions.size());
- return m;
+    return m;
 }
 
 void put_pictures(const ScratchFolder& folder, const CameraPath& path, bool depth, bool labels = true)
@@ -245,6 +245,28 @@ TEST(EngineFusionLenses, sweeps_lie_where_the_path_is_placed)
         for (size_t n = 0; n < 16; ++n)
             EXPECT_NEAR(found[n], expect[n], 1e-6) << i << " " << n;
     }
+}
+
+TEST(EngineFusionLenses, pixels_that_are_not_used_are_left_out)
+{
+    const ScratchFolder folder;
+    const CameraPath path{StreetScene::drive(1)};
+    put_pictures(folder, path, true);
+    const auto whole = FusionFolder::open(folder.path(), {});
+    ASSERT_TRUE(whole) << whole.error().message;
+    std::filesystem::create_directory(folder / "used");
+    std::vector<uint8_t> used(80 * 60, 255); // of half the size
+    for (size_t i = 0; i < used.size(); ++i)
+        used[i] = i % 80 < 40 ? 255 : 0;
+    ASSERT_TRUE(write_png_gray8(folder / "used/000000.png", 80, 60, used));
+    const auto half = FusionFolder::open(folder.path(), {});
+    ASSERT_TRUE(half) << half.error().message;
+    const auto all = whole->frames().load(0), left = half->frames().load(0);
+    ASSERT_TRUE(all && left);
+    for (size_t i = 0; i < all->depth.size(); ++i)
+        ASSERT_EQ(left->depth[i], i % 160 < 80 ? all->depth[i] : 0) << i;
+    ASSERT_TRUE(write_png_gray8(folder / "used/000000.png", 80, 30, std::vector<uint8_t>(80 * 30)));
+    EXPECT_TRUE(says(FusionFolder::open(folder.path(), {}), "used/000000.png' is 80 x 30 pixels"));
 }
 
 TEST(EngineFusionLenses, spoilt_sweeps_are_refused_by_name)

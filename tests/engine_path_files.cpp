@@ -118,6 +118,8 @@ TEST_F(DataSetPaths, of_cameras_have_their_axes_and_times)
     expect_looking_along_x(panda, 0, {1, 2, 3});
     EXPECT_EQ(panda.frames[0].time, 1557539924.5);
     EXPECT_EQ(panda.frames[0].intrinsics.fy, 1971);
+    EXPECT_EQ(panda.frames[0].intrinsics.cx, 970.5); // counted from the centre of the first pixel in the file
+    EXPECT_EQ(panda.frames[0].intrinsics.cy, 483.5);
 }
 
 TEST_F(DataSetPaths, of_vehicles_become_a_camera_that_looks_forward)

@@ -1,19 +1,19 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/drawing.h"
-#include "engine/job/device_key.h"
+#include "engine/job/run_folder.h"
 
 #include "engine/format/buffer_folder.h"
 #include "engine/format/image.h"
 #include "engine/format/labelled_points.h"
 #include "engine/job/budget_meter.h"
-#include "engine/job/device_key.h"
 #include "engine/job/drawing_store.h"
 #include "engine/job/empty_frames.h"
 #include "engine/job/input_hashes.h"
 #include "engine/job/lidar_returns.h"
 #include "engine/job/outgoing.h"
 #include "engine/job/outputs.h"
+#include "engine/job/run_folder.h"
 #include "engine/job/version.h"
 #include "engine/scene/palette.h"
 #include "engine/splat/bounds.h"

@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/format/transforms.h"
-#include "engine/job/device_key.h"
 #include "engine/job/frame_boxes.h"
 #include "engine/job/input_hashes.h"
 #include "engine/job/outputs.h"
 #include "engine/job/refinement.h"
+#include "engine/job/run_folder.h"
 #include "engine/job/version.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"

@@ -249,4 +249,9 @@ Status RunFolder::finish(const Json& results)
     return {};
 }
 
+Json device_key(const Device& device)
+{
+    return {{"device", device.name()}, {"driver", device.driver()}, {"kernels", kernels_text(device.limits())}};
+}
+
 } // namespace semrover

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "runtime/base/json.h"
+#include "runtime/device/device.h"
 
 #include <optional>
 #include <vector>
@@ -62,5 +63,8 @@ class RunFolder {
     bool appended_ = false;
     system::File lock_, journal_;
 };
+
+// What of a device decides bytes, for a run's settings: name, driver, and which kernels it gets
+Json device_key(const Device& device);
 
 } // namespace semrover

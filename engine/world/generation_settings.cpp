@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/world/generation_settings.h"
 
-#include "engine/job/device_key.h"
+#include "engine/job/run_folder.h"
 #include "engine/job/version.h"
 #include "engine/scene/tiles.h"
 #include "runtime/base/hash.h"

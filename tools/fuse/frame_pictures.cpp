@@ -145,6 +145,8 @@ Result<std::vector<FramePictures>> find_pictures(const Path& folder, const Path&
         named = named || !cameras[i].picture.empty();
         SR_TRY(FramePictures p,
                cameras[i].picture.empty() ? numbered.next(i, cameras[i].camera) : pictures_of_name(folder, cameras[i]));
+        if (!p.color.empty())
+            p.used = optional_picture(sibling(folder, p.color, "used"));
         pictures.push_back(std::move(p));
     }
     if (!named)

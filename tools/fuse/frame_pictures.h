@@ -8,9 +8,10 @@
 
 namespace semrover {
 
-// where the pictures of a frame lie; label and color empty: none
+// where the pictures of a frame lie; label, color and used empty: none
 struct FramePictures {
     Path depth, label, color;
+    Path used = {}; // 0: a pixel is left out
 };
 
 constexpr const char* kDepthMaps = "stereo/depth_maps"; // of a workspace of COLMAP's dense reconstruction

@@ -226,13 +226,13 @@ Status FusionFolder::check_pictures()
         FramePictures& p = pictures_[i];
         if (lidar_)
             p.depth.clear();
-        for (const Path* path : {&p.depth, &p.label, &p.color})
+        for (const Path* path : {&p.depth, &p.label, &p.color, &p.used})
             if (!path->empty() && !is_file(*path))
                 return fail(ErrorCode::bad_input, "{}: {} is missing", name_of(i), quote_path(*path));
         if (!lidar_)
             SR_CHECK(fit_intrinsics(i));
         const ImageSize depth = depth_size(i);
-        for (const Path* path : {&p.label, &p.color}) {
+        for (const Path* path : {&p.label, &p.color, &p.used}) {
             if (path->empty() || is_jpeg(*path))
                 continue;
             SR_TRY(const ImageSize size, number_image_size(*path));
@@ -365,14 +365,27 @@ Status FusionFolder::load_depth(size_t frame, Loaded& loaded) const
     return {};
 }
 
-// colours and labels of a picture; depth becomes 0 where the map of labels leaves a pixel out
+// depth becomes 0 where a pixel is not used
+Status FusionFolder::mask_depth(size_t frame, DepthImages& images) const
+{
+    const Path& path = pictures_[frame].used;
+    SR_TRY(LabelImage used, read_label_image(path));
+    SR_CHECK(check_view(path, used.size, depth_size(frame)));
+    if (used.size != depth_size(frame))
+        used.numbers = nearest_pixels(used.numbers, used.size, depth_size(frame));
+    for (size_t i = 0; i < used.numbers.size(); ++i)
+        images.depth[i] = used.numbers[i] ? images.depth[i] : 0;
+    return {};
+}
+
+// colours and labels of a picture; depth becomes 0 where a pixel is left out
 Status FusionFolder::load_picture(size_t frame, DepthImages& images) const
 {
     if (!pictures_[frame].label.empty() && classes_.counted())
         SR_CHECK(load_labels(frame, images));
     if (!pictures_[frame].color.empty())
         SR_CHECK(load_colors(frame, images));
-    return {};
+    return pictures_[frame].used.empty() ? Status() : mask_depth(frame, images);
 }
 
 Result<DepthImages> FusionFolder::load_view(const View& view) const

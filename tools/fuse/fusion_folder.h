@@ -27,7 +27,7 @@ struct FusionFolderOptions {
 //   intrinsics.json {"fx", "fy", "cx", "cy", "width", "height"}, where the path has none and no option gives them
 //   [CAMERA/]depth/NNNNNN.png  or .npy: depth_image.h; where there is none, LIDAR/sweeps.json and
 //   LIDAR/points/NNNNNN.npy [CAMERA/]label/NNNNNN.png  or .npy: number_image.h; a folder without label/ has none at all
-//   [CAMERA/]color/NNNNNN.png  or .jpg, likewise
+//   [CAMERA/]color/NNNNNN.png  or .jpg, likewise; used/ beside it: pixels that are 0 there are left out
 // numbered by the frames of each camera. A frame of transforms.json may name its picture (file_path, relative to the
 // folder): depth and label then have its name in depth/ and label/ beside the picture's folder, unless depth_file_path
 // and label_file_path name them. COLMAP's pictures have names, too, and TUM RGB-D's times.
@@ -75,6 +75,7 @@ class FusionFolder {
     Status load_depth(size_t frame, Loaded& loaded) const;
     Status load_labels(size_t frame, DepthImages& images) const;
     Status load_colors(size_t frame, DepthImages& images) const;
+    Status mask_depth(size_t frame, DepthImages& images) const;
     Status load_picture(size_t frame, DepthImages& images) const;
     std::string name_of(size_t frame) const;
 

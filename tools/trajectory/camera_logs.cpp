@@ -54,7 +54,8 @@ Result<std::vector<double>> pandaset_times(const Path& path, size_t frames)
     return times;
 }
 
-// fx, fy, cx, cy; the pictures' size is the one given, or where none is, the data set's
+// fx, fy, cx, cy, which count from the centre of the first pixel; the pictures' size is the one given, or where none
+// is, the data set's
 Result<Intrinsics> pandaset_lens(const Path& path, const PathLens& lens)
 {
     SR_TRY(const Json json, read_json(path));
@@ -70,6 +71,8 @@ Result<Intrinsics> pandaset_lens(const Path& path, const PathLens& lens)
             return fail(ErrorCode::bad_input, "{}: {} is missing", where, key);
         *value = *found;
     }
+    k.cx += 0.5;
+    k.cy += 0.5;
     SR_CHECK(check_intrinsics(k, where));
     return k;
 }

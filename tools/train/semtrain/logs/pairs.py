@@ -20,6 +20,16 @@ class Pairs:
     def __init__(self, output, log, options):
         self.log, self.options = log, options
         self.drive, self.scene = (os.path.join(output, name) for name in ("drive", "scene"))
+        self.visible = self._visible()
+
+    def _visible(self):
+        """what buffer/visible says: "sky" or "splats" """
+        pictures = [picture for camera in self.log.cameras for picture in camera.pictures]
+        bare = 0 if self.options.labels else sum(not (picture.labels or picture.sky) for picture in pictures)
+        if bare and self.options.visible == "sky":
+            raise SystemExit(f"{bare} of {len(pictures)} pictures have no labels that tell their sky: --labels, --cameras, "
+                             "--frames, or --visible splats")
+        return self.options.visible or ("splats" if bare else "sky")
 
     def import_drive(self):
         """OUT/drive but its buffers"""
@@ -41,20 +51,14 @@ class Pairs:
     def draw_buffers(self):
         """OUT/drive/buffer: splats, and what of a picture is not sky"""
         o, buffer = self.options, os.path.join(self.drive, "buffer")
-        frames = read_json(os.path.join(self.drive, "transforms.json"))["frames"]
-        bare = sum("label_file_path" not in frame for frame in frames)
-        visible = o.visible or ("splats" if bare else "sky")
-        if bare and visible == "sky":
-            raise SystemExit(f"{self.drive}: {bare} of {len(frames)} pictures have no labels that tell their sky: "
-                             "--labels, --cameras, --frames, or --visible splats")
-        print(f"{buffer}: visible is {'what is not sky' if visible == 'sky' else 'where splats are'}", flush=True)
+        print(f"{buffer}: visible is {'what is not sky' if self.visible == 'sky' else 'where splats are'}", flush=True)
         grid = os.path.join(self.scene, "voxfield.sgrid")
-        about = {"grid": digest([grid]), "splat_radius": o.splat_radius, "visible": visible}
+        about = {"grid": digest([grid]), "splat_radius": o.splat_radius, "visible": self.visible}
 
         def draw():
             make_buffers(grid, self.drive, self.drive, (o.width, o.height), o.splat_radius)
-            if visible == "sky":
-                put_sky(self.drive, buffer, frames)
+            if self.visible == "sky":
+                put_sky(self.drive, buffer, read_json(os.path.join(self.drive, "transforms.json"))["frames"])
 
         step(buffer, about, draw)
 
