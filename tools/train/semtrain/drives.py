@@ -11,8 +11,6 @@ import os
 import shutil
 
 from .content import digest, keep_made_of
-from .frames import SPLATS
-from .json_file import write_json
 from .program import semrover
 from .streets import make_street
 
@@ -35,8 +33,6 @@ def make_buffers(grid, drive, folder, size, splat_radius):
     shutil.rmtree(buffer, ignore_errors=True)
     semrover("render", grid, "--path", os.path.join(drive, "transforms.json"), "-W", size[0], "-H", size[1],
              "--splat-radius", splat_radius, "-o", buffer, "--quiet")
-    radius = splat_radius if splat_radius == "auto" else float(splat_radius)
-    write_json(os.path.join(folder, SPLATS), {"splat_radius": radius})
 
 
 def daylight(options):

@@ -9,7 +9,7 @@ A drive is a folder anywhere below the root, its frames numbered in the order in
     label/000000.png            class numbers, for `inception` alone
     used/000000.png             where it is there: 0 for pixels that `asd` and `vsd` are not trained on; `run logs`
                                 leaves out what moves
-    buffer/splats.json          how large the splats were, {"splat_radius": "auto" or metres}; `run drives` writes it
+    buffer/run.json             of `semrover render`: says how large the splats were
 `semrover streets --images` writes the first and the labels, `semrover render GRID --path transforms.json -o buffer` the
 others. Of a rig each camera is a drive: CAMERA/color, CAMERA/label, CAMERA/used, buffer/CAMERA/color,
 buffer/CAMERA/visible. Any of these folders may be in a shard set.
@@ -23,7 +23,6 @@ from PIL import Image
 from .json_file import read_json
 from .pictures import pictures_below
 
-SPLATS = "buffer/splats.json"
 
 
 def picture_name(number):
@@ -32,7 +31,7 @@ def picture_name(number):
 
 class Drive:
     """One as above, or one camera's; a frame that lacks one of the three pictures is left out, and begins a new
-    sequence. The arguments are {number: Picture}, and the folder that has splats.json"""
+    sequence. The arguments are {number: Picture}, and the folder that has run.json"""
 
     def __init__(self, folder, truths, buffers, visible, labels, used, of_buffers):
         self.folder, self.parts, self.of_buffers = folder, (truths, buffers, visible), of_buffers
@@ -70,8 +69,10 @@ class Drive:
 
     def splat_radius(self):
         """of the buffers: "auto", metres, or None where nothing says it"""
-        path = os.path.join(self.of_buffers, os.path.basename(SPLATS))
-        return read_json(path)["splat_radius"] if os.path.exists(path) else None
+        path = os.path.join(self.of_buffers, "run.json")
+        run = read_json(path) if os.path.exists(path) else {}
+        radius = run.get("settings", {}).get("drive", {}).get("splat_radius")
+        return radius if radius in ("auto", None) else float(radius)
 
 
 def find_drives(root):
@@ -114,10 +115,9 @@ def splats_of(drives, defaults):
         if other.splat_radius() != radius:
             raise SystemExit(
                 f"buffers of two kinds: {first.folder} was drawn with splat_radius {radius or 'unknown'}, {other.folder} "
-                f"with {other.splat_radius() or 'unknown'} ({SPLATS} says it). Draw one of them again, or write that "
-                "file where you know the radius")
+                f"with {other.splat_radius() or 'unknown'} (buffer/run.json says it). Draw one of them again")
     if radius is None:
-        print(f"{first.folder}: no {SPLATS} says with which --splat-radius the buffers were drawn; the model will say "
+        print(f"{first.folder}: no buffer/run.json says with which --splat-radius the buffers were drawn; the model will say "
               f"{defaults.get('splat_radius', 'nothing, which is 0.04')}", flush=True)
         return defaults
     return {**defaults, "splat_radius": radius}

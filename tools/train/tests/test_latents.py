@@ -16,7 +16,7 @@ from semtrain.frames import find_drives, find_made_drives
 from semtrain.json_file import write_json
 from semtrain.nets.vae import AutoencoderKL
 from semtrain.program import engine_path, semrover
-from test_recipes_asd import ASD, VAE, draw_drive
+from test_recipes_asd import ASD, VAE, draw_drive, put_radius
 from test_runs import InAFolder
 from test_transformer import write_street
 
@@ -151,7 +151,7 @@ class WrittenByTheProgram(WithAVae):
                  "--format", pictures, "--quiet", "-o", self.path(*folder, "buffer"))
 
     def test_each_camera_is_a_drive(self):
-        write_json(self.path("frames", "plain", "buffer", "splats.json"), {"splat_radius": 0.05})
+        put_radius(self.path("frames", "plain"), 0.05)
         drives = find_drives(self.path("frames"))
         self.assertEqual([os.path.relpath(d.folder, self.path("frames")) for d in drives],
                          ["plain/front", "plain/wide"])

@@ -22,7 +22,7 @@ from semtrain.frames import find_drives
 from semtrain.grids import find_grids, read_grid
 from semtrain.json_file import read_json, write_json
 from semtrain.logs.__main__ import main as run_logs
-from semtrain.logs.boxes import Track, used_picture
+from semtrain.logs.boxes import Track, moving_boxes, used_picture
 from semtrain.logs.import_drive import OPENGL
 from semtrain.logs.kitti360 import read_times
 from semtrain.logs.label_table import NOTHING, SKY, LabelTable
@@ -548,6 +548,12 @@ class Lenses(unittest.TestCase):
         self.assertEqual(used_picture(middle, lens, [(rigid([0, 0, -4], np.eye(3)), np.ones(3))]).min(), 255)
         around = used_picture(middle, lens, [(rigid([2, 0, 0], np.eye(3)), np.array([1.0, 1, 5]))])
         self.assertEqual((int(around[24, 0]), int(around[24, 63])), (255, 0))
+
+    def test_a_thing_is_where_it_was_seen_and_as_long_as_that(self):
+        track = Track(np.ones(3), Motion([1.0, 2.0], [rigid([x, 0, 0], np.eye(3)) for x in (0, 4)]), 0.5)
+        self.assertEqual(len(moving_boxes([track], 0.0, 0.4)), 0)
+        self.assertEqual(len(moving_boxes([track], 2.6, 9.0)), 0)
+        self.assertEqual([pose[0, 3] for pose, _ in moving_boxes([track], 0.0, 2.0)], [-2, 0, 2, 4])
 
     def test_what_moves_less_than_half_a_metre_stands(self):
         for metres, moves in ((0.4, False), (0.6, True)):

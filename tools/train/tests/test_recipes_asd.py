@@ -38,6 +38,11 @@ ASD = {**COMMON, "in_channels": 13, "out_channels": 4, "block_out_channels": [16
        "defaults": {"num_inference_steps": 2, "guidance_scale": 1.5, "previous_noise": 0.3}}
 
 
+def put_radius(drive, radius):
+    """what `semrover render` says of the splats of DRIVE/buffer"""
+    write_json(os.path.join(drive, "buffer", "run.json"), {"settings": {"drive": {"splat_radius": str(radius)}}})
+
+
 def draw_drive(folder, seed):
     """a slope of colours that moves from frame to frame; its buffer has holes"""
     random = np.random.default_rng(seed)
@@ -73,7 +78,7 @@ class Recipes(unittest.TestCase):
         cls.folder = cls.holder.name
         for i in range(2):
             draw_drive(cls.path("frames", str(i)), i)
-            write_json(cls.path("frames", str(i), "buffer", "splats.json"), {"splat_radius": "auto"})
+            put_radius(cls.path("frames", str(i)), "auto")
         for name, config in (("vae", VAE), ("asd", ASD)):
             with open(cls.path(name + ".json"), "w") as file:
                 json.dump(config, file)

@@ -27,7 +27,7 @@ from semtrain.nets.vae import AutoencoderKL
 from semtrain.run_folder import RunFolder
 from semtrain.safetensors_file import read_header
 from semtrain.streets import make_street
-from test_recipes_asd import VAE, draw_drive
+from test_recipes_asd import VAE, draw_drive, put_radius
 from test_transformer import TINY, train, write_street
 
 ENVIRONMENT = {**os.environ, "PYTHON": os.environ.get("PYTHON", "/usr/bin/python3")}
@@ -210,14 +210,14 @@ class SplatsOfBuffers(InAFolder):
         for i, radius in enumerate(radii):
             draw_drive(self.path("frames", str(i)), i)
             if radius is not None:
-                write_json(self.path("frames", str(i), "buffer", "splats.json"), {"splat_radius": radius})
+                put_radius(self.path("frames", str(i)), radius)
         return find_drives(self.path("frames"))
 
     def test_are_what_the_model_says(self):
         drives = self.drives("auto", "auto")
         self.assertEqual(splats_of(drives, {"a": 1, "splat_radius": 0.5}), {"a": 1, "splat_radius": "auto"})
         for i in range(2):
-            write_json(self.path("frames", str(i), "buffer", "splats.json"), {"splat_radius": 0.03})
+            put_radius(self.path("frames", str(i)), 0.03)
         self.assertEqual(splats_of(drives, {}), {"splat_radius": 0.03})
 
     def test_of_two_kinds_are_refused(self):
@@ -231,7 +231,7 @@ class SplatsOfBuffers(InAFolder):
     def test_that_nobody_knows_are_left_to_the_settings_with_a_line(self):
         with contextlib.redirect_stdout(io.StringIO()) as out:
             self.assertEqual(splats_of(self.drives(None, None), {"splat_radius": "auto"}), {"splat_radius": "auto"})
-        self.assertIn("no buffer/splats.json says with which --splat-radius", out.getvalue())
+        self.assertIn("no buffer/run.json says with which --splat-radius", out.getvalue())
 
 
 class AComponentOfOtherPrograms(InAFolder):

@@ -28,9 +28,10 @@ class Track(NamedTuple):
         return bool((np.linalg.norm(places - places[0], axis=1) > MOVES_FROM).any())
 
     def poses(self, times):
-        """at those of the times at which it is known"""
+        """[N, 4, 4] at those of the times at which it is known"""
         first, last = self.motion.times[0] - self.every, self.motion.times[-1] + self.every
-        return self.motion.at([t for t in times if first <= t <= last])
+        known = [t for t in times if first <= t <= last]
+        return self.motion.at(known) if known else np.empty((0, 4, 4))  # scipy has no empty list of rotations
 
     def half(self):
         return (self.size * LARGER + MARGIN) / 2
