@@ -159,6 +159,9 @@ struct LidarDrive {
                 path.frames.back().camera = std::string("camera") + char('0' + side);
             }
         put_pictures(folder, path, false, labels_of_pictures);
+        std::filesystem::create_directories(folder / "buffer/camera0/depth"); // of `render`: not the frames' own
+        const std::vector<uint16_t> other(160 * 120, 1000);
+        EXPECT_TRUE(write_png_gray16(folder / "buffer/camera0/depth/000000.png", 160, 120, other));
         std::filesystem::create_directories(folder / "roof/points");
         Json sweeps = Json::array();
         for (size_t i = 0; i < kSweeps; ++i) {

@@ -135,10 +135,10 @@ Result<FusionFolder> FusionFolder::open(const Path& folder, const FusionFolderOp
     f.encoding_ = options.depth;
     SR_TRY(f.encoding_.usual_unit, read_depth_unit(folder));
     SR_TRY(f.classes_, PictureClasses::create(options.map));
-    if (!first_depth_size(folder))
-        f.lidar_ = find_lidar(folder);
     SR_CHECK(f.read_poses(poses, options));
     SR_CHECK(f.find_frames(poses, options));
+    if (std::ranges::none_of(f.pictures_, [](const FramePictures& p) { return is_file(p.depth); }))
+        f.lidar_ = find_lidar(folder);
     SR_CHECK(f.check_pictures());
     if (f.lidar_) {
         SR_TRY(SweepFrames sweeps, SweepFrames::open(*f.lidar_, f.placed_, f.cameras_));
