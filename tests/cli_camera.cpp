@@ -12,10 +12,12 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <fstream>
 #include <gtest/gtest.h>
 #include <map>
 #include <set>
 #include <sstream>
+#include <sys/stat.h>
 
 namespace semrover {
 namespace cli_camera_test {
@@ -413,6 +415,12 @@ TEST(CliCamera, a_drawing_that_was_killed_goes_on_to_the_same_bytes)
             fs::resize_file(out / "front/color/000000.png", 20);
             fs::remove(out / "lens/alpha/000001.npy");
         }
+        if (pieces == 8) { // a line that names a file elsewhere, which would be waited for if it were opened
+            fs::create_directories(d.folder / "trap/color");
+            ASSERT_EQ(mkfifo((d.folder / "trap/color/000000.png").c_str(), 0600), 0);
+            std::ofstream(out / "journal.jsonl", std::ios::app) << R"({"piece": "../trap/000000", "xxh64": "0"})"
+                                                                << "\n";
+        }
         if (pieces == 30)
             expect_error(render(out, line + video.string() + " --semantic"), 3, "holds a run with other settings");
         const ProgramResult resumed = render(out, line + video.string());
@@ -432,6 +440,38 @@ TEST(CliCamera, a_drawing_that_was_killed_goes_on_to_the_same_bytes)
     const ProgramResult resumed = render(out, jpeg);
     EXPECT_EQ(resumed.code, 0) << resumed.err;
     EXPECT_EQ(contents(d.folder / "whole.mp4"), contents(video));
+}
+
+TEST(CliCamera, beyond_the_limit_of_a_file_s_size_is_an_error_and_leaves_nothing_unfinished)
+{
+    const RigDrive d;
+    const ProgramResult limited = run_program_line(
+        "ulimit -f 8; MESA_SHADER_CACHE_DISABLE=1 XDG_CACHE_HOME=" + (d.folder / "none").string() + " " SEMROVER_BINARY,
+        "render " + kGrid + " -q -o " + (d.folder / "limited").string() + " " + d.options + "--npy");
+    EXPECT_EQ(limited.code, 3) << limited.err;
+    EXPECT_NE(limited.err.find("File too large"), std::string::npos) << limited.err;
+    for (const auto& entry : fs::recursive_directory_iterator(d.folder / "limited"))
+        EXPECT_FALSE(entry.path().filename().string().starts_with(".semrover-")) << entry.path();
+}
+
+TEST(CliCamera, a_video_is_a_file_whatever_its_name_looks_like)
+{
+    const RigDrive d;
+    const auto draw = [&](const std::string& video) {
+        return run_program_line("cd " + d.folder.path().string() + " && " SEMROVER_BINARY,
+                                "render " + kGrid + " -q -o out -y " + d.options + "--video " + video);
+    };
+    for (const char* name : {"./-dash/v.mp4", "c:on/v.mp4", "tcp:/127.0.0.1:9/v.mp4", "v.mp4"}) {
+        const Path video = d.folder / name;
+        fs::create_directories(video.parent_path());
+        const ProgramResult made = draw(name);
+        EXPECT_EQ(made.code, 0) << made.err;
+        EXPECT_EQ(contents(video).substr(4, 4), "ftyp") << name;
+    }
+    // what cannot be renamed is not left there
+    fs::create_directories(d.folder / "full/v.mp4/in");
+    EXPECT_NE(draw("full/v.mp4").code, 0);
+    EXPECT_EQ(std::distance(fs::directory_iterator(d.folder / "full"), fs::directory_iterator()), 1);
 }
 
 // a wall whose nearest face is 58.2 m ahead at the left and 88.2 m at the right, and nothing else

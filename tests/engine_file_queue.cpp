@@ -11,6 +11,10 @@
 #include <future>
 #include <gtest/gtest.h>
 #include <memory>
+#include <new>
+#include <pthread.h>
+#include <system_error>
+#include <thread>
 
 namespace semrover {
 namespace engine_file_queue_test {
@@ -51,6 +55,63 @@ TEST(engine_file_queue, files_appear_in_order_whoever_makes_them)
         for (const std::string& name : expected)
             EXPECT_EQ(contents(folder / name), name);
         EXPECT_EQ(folder.entries(), 61u); // nothing temporary
+    }
+}
+
+// no thread can be made while one lives: stacks would be too large
+class NoThreads {
+  public:
+    NoThreads()
+    {
+        EXPECT_EQ(pthread_getattr_default_np(&before_), 0);
+        pthread_attr_t huge;
+        EXPECT_EQ(pthread_attr_init(&huge), 0);
+        EXPECT_EQ(pthread_attr_setstacksize(&huge, size_t(1) << 46), 0);
+        EXPECT_EQ(pthread_setattr_default_np(&huge), 0);
+        pthread_attr_destroy(&huge);
+    }
+    ~NoThreads()
+    {
+        EXPECT_EQ(pthread_setattr_default_np(&before_), 0);
+        pthread_attr_destroy(&before_);
+    }
+
+  private:
+    pthread_attr_t before_;
+};
+
+TEST(engine_file_queue, where_no_thread_can_be_made_the_caller_makes_the_files)
+{
+    const NoThreads none;
+    EXPECT_THROW(std::thread([] {}), std::system_error);
+    const ScratchFolder folder;
+    std::vector<std::string> names, expected;
+    {
+        FileQueue queue(2);
+        for (int i = 0; i < 30; ++i) { // more than may wait
+            expected.push_back(fmt::format("{:02}", i));
+            ASSERT_TRUE(queue.push(1, file(folder / expected.back(), expected.back(), names)));
+        }
+        ASSERT_TRUE(queue.drain());
+        EXPECT_EQ(names, expected);
+        ASSERT_TRUE(queue.push(1, file(folder / "last", "last", names)));
+    }
+    EXPECT_EQ(contents(folder / "last"), "last");
+}
+
+TEST(engine_file_queue, short_memory_in_a_thread_is_an_error_of_the_queue)
+{
+    const FileQueue::Make good = []() -> Result<Commit> { return Commit([] { return Status(); }); };
+    const FileQueue::Make unmade = []() -> Result<Commit> { throw std::bad_alloc(); };
+    const FileQueue::Make uncommitted = []() -> Result<Commit> {
+        return Commit([]() -> Status { throw std::bad_alloc(); });
+    };
+    for (const FileQueue::Make& short_of_memory : {unmade, uncommitted}) {
+        FileQueue queue(2);
+        ASSERT_TRUE(queue.push(1, good));
+        (void)queue.push(1, short_of_memory);
+        EXPECT_TRUE(says(queue.drain(), "no host memory to make a file"));
+        EXPECT_TRUE(says(queue.push(1, good), "no host memory to make a file"));
     }
 }
 

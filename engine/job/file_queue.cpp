@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdlib>
+#include <new>
 #include <string_view>
+#include <system_error>
 
 namespace semrover {
 
@@ -17,14 +19,28 @@ constexpr uint32_t kMostThreads = 16;
 constexpr size_t kRoom = 8; // tasks that wait, beside two a thread
 constexpr uint64_t kMostBytes = 512ull << 20;
 
+// an exception that leaves a thread ends the process
+template <typename F>
+auto unless_memory_is_short(const F& f) -> decltype(f())
+{
+    try {
+        return f();
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::out_of_memory, "no host memory to make a file");
+    }
+}
+
 } // namespace
 
 FileQueue::FileQueue(uint32_t threads)
 {
     const uint32_t count = threads ? threads : usable_threads();
     room_ = kRoom + 2 * (count - 1);
-    for (uint32_t i = 0; i < count; ++i)
-        threads_.emplace_back([this] { work(); });
+    try {
+        while (threads_.size() < count)
+            threads_.emplace_back([this] { work(); });
+    } catch (const std::system_error&) { // no more threads: those that are there do it, or the caller
+    }
 }
 
 FileQueue::~FileQueue()
@@ -36,12 +52,16 @@ FileQueue::~FileQueue()
     changed_.notify_all();
     for (std::thread& thread : threads_)
         thread.join();
+    if (threads_.empty())
+        work();
 }
 
 template <typename F>
 void FileQueue::wait(Lock& lock, F until)
 {
     const auto start = std::chrono::steady_clock::now();
+    while (threads_.empty() && !until())
+        may_commit() ? commit_first(lock) : make_next(lock);
     changed_.wait(lock, until);
     waited_ += seconds_since(start);
 }
@@ -84,7 +104,7 @@ void FileQueue::make_next(Lock& lock)
     Result<Commit> made = Commit();
     if (status_) {
         lock.unlock();
-        made = task.make();
+        made = unless_memory_is_short(task.make);
         task.make = {}; // with what it held
         lock.lock();
     }
@@ -98,7 +118,7 @@ void FileQueue::commit_first(Lock& lock)
     Task& task = tasks_.front();
     if (status_) {
         lock.unlock();
-        Status done = *task.made ? (**task.made)() : tl::make_unexpected(task.made->error());
+        Status done = *task.made ? unless_memory_is_short(**task.made) : tl::make_unexpected(task.made->error());
         lock.lock();
         status_ = std::move(done);
     }

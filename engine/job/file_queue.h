@@ -22,11 +22,12 @@ class FileQueue {
     using Commit = std::function<Status()>;       // lets a file appear; one at a time, in order
     using Make = std::function<Result<Commit>()>; // on any thread
 
-    // 0: usable_threads()
+    // 0: usable_threads(). Where threads cannot be made, there are fewer, and without one the caller makes the files
     explicit FileQueue(uint32_t threads);
     ~FileQueue(); // after everything that was handed over
 
-    // bytes: of host memory that `make` holds, what waits is limited by. Waits for room. Errors: of one before this one
+    // bytes: of host memory that `make` holds, what waits is limited by. Waits for room. Errors: of one before this
+    // one; out_of_memory where making it throws std::bad_alloc
     Status push(uint64_t bytes, Make make);
     Status drain();                                 // until all has appeared; likewise
     double wait_seconds() const { return waited_; } // that the caller of both has spent in them

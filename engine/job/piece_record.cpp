@@ -3,6 +3,7 @@
 #include "engine/job/piece_record.h"
 
 #include "runtime/base/hash.h"
+#include "runtime/base/inner_path.h"
 
 namespace semrover {
 
@@ -12,6 +13,8 @@ PieceRecord::PieceRecord(RunFolder& run, const FilesOf& files) : run_(run)
         if (!entry.is_object() || !entry.value("piece", Json()).is_string())
             continue;
         const std::string piece = entry["piece"];
+        if (!leads_inside(piece)) // of a journal that somebody else wrote
+            continue;
         const auto now = hash_files(files(piece));
         done_[piece] = now && entry.value("xxh64", Json()) == hash_text(*now);
     }

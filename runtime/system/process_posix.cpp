@@ -62,7 +62,9 @@ void prepare_streams()
          {std::pair{STDIN_FILENO, O_RDONLY}, {STDOUT_FILENO, O_RDONLY}, {STDERR_FILENO, O_WRONLY}})
         if (::fcntl(fd, F_GETFD) < 0 && errno == EBADF)
             (void)!::open("/dev/null", flags); // gets the lowest number that is free, which is fd
+    // writes to a closed pipe and beyond the limit of a file's size are errors
     std::signal(SIGPIPE, SIG_IGN);
+    std::signal(SIGXFSZ, SIG_IGN);
 }
 
 bool standard_error_is_terminal()

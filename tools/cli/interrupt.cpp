@@ -10,6 +10,7 @@
 #include <atomic>
 #include <chrono>
 #include <mutex>
+#include <system_error>
 #include <thread>
 
 namespace semrover {
@@ -64,7 +65,10 @@ void watch_interrupts()
 {
     message();
     system::watch_stop_requests();
-    std::thread(wait_for_requests).detach();
+    try {
+        std::thread(wait_for_requests).detach();
+    } catch (const std::system_error&) { // no threads: a request is seen between two pieces of work
+    }
 }
 
 bool interrupt_requested()

@@ -33,7 +33,8 @@ Result<Video> Video::create(const Path& path, uint32_t width, uint32_t height, i
         fmt::format("{}x{}", width, height), "-framerate", std::to_string(frames_per_second), "-i", "-",
         // H.264 in 4:2:0 wants even sides
         "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-f", "mp4",
-        "-movflags", "+faststart", v.temporary_.string()};
+        // note: a name alone may look like an option or an address, such as -o/v.mp4 or tcp://host/v.mp4
+        "-movflags", "+faststart", "file:" + v.temporary_.string()};
     const Together started_and_known;
     SR_TRY(system::Process child, start_ffmpeg(arguments));
     v.child_ = std::make_unique<system::Process>(std::move(child));
@@ -72,8 +73,10 @@ Status Video::finish()
     }
     std::error_code error;
     std::filesystem::rename(temporary_, path_, error);
-    if (error)
+    if (error) {
+        system::remove_file(temporary_);
         return fail(ErrorCode::bad_input, "cannot write {}: {}", quote_path(path_), error.message());
+    }
     return {};
 }
 

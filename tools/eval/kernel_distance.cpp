@@ -8,6 +8,7 @@
 #include <Eigen/Dense>
 #include <random>
 #include <span>
+#include <system_error>
 #include <thread>
 
 namespace semrover {
@@ -67,8 +68,11 @@ void in_parallel(size_t count, const std::function<void(size_t)>& body)
             body(i);
     };
     std::vector<std::jthread> threads; // joined when they go
-    for (size_t t = 1; t < std::min<size_t>(std::thread::hardware_concurrency(), count); ++t)
-        threads.emplace_back(work);
+    try {
+        for (size_t t = 1; t < std::min<size_t>(std::thread::hardware_concurrency(), count); ++t)
+            threads.emplace_back(work);
+    } catch (const std::system_error&) { // no more threads: those that are there do it
+    }
     work();
 }
 
