@@ -19,7 +19,6 @@ from semtrain.frames import read_rgb
 from semtrain.pictures import Picture
 from semtrain.inception import Frames, draw_strengths, judge, loss_of, read_network, write_network
 from semtrain.nets.inception import Inception, pool_of, resized
-from semtrain.nets.norms import measure_norms
 from semtrain.program import engine_path
 
 SEMROVER = engine_path()
