@@ -322,16 +322,22 @@ size_t FusionFolder::colored() const
     return size_t(std::ranges::count_if(pictures_, [](const FramePictures& p) { return !p.color.empty(); }));
 }
 
+// the numbers of a picture beside a frame's depth, at its size
+Result<std::vector<uint16_t>> FusionFolder::numbers_of(const Path& path, size_t frame) const
+{
+    SR_TRY(LabelImage image, read_label_image(path));
+    SR_CHECK(check_view(path, image.size, depth_size(frame)));
+    if (image.size != depth_size(frame))
+        image.numbers = nearest_pixels(image.numbers, image.size, depth_size(frame));
+    return std::move(image.numbers);
+}
+
 Status FusionFolder::load_labels(size_t frame, DepthImages& images) const
 {
-    const Path& path = pictures_[frame].label;
-    SR_TRY(LabelImage label, read_label_image(path));
-    SR_CHECK(check_view(path, label.size, depth_size(frame)));
-    if (label.size != depth_size(frame))
-        label.numbers = nearest_pixels(label.numbers, label.size, depth_size(frame));
-    images.labels.resize(label.numbers.size());
+    SR_TRY(const std::vector<uint16_t> numbers, numbers_of(pictures_[frame].label, frame));
+    images.labels.resize(numbers.size());
     for (size_t i = 0; i < images.labels.size(); ++i) {
-        const uint8_t target = classes_[label.numbers[i]];
+        const uint8_t target = classes_[numbers[i]];
         if (target == kLeftOut)
             images.depth[i] = 0;
         images.labels[i] = target < kClassCount ? target : kNoLabel;
@@ -368,13 +374,9 @@ Status FusionFolder::load_depth(size_t frame, Loaded& loaded) const
 // depth becomes 0 where a pixel is not used
 Status FusionFolder::mask_depth(size_t frame, DepthImages& images) const
 {
-    const Path& path = pictures_[frame].used;
-    SR_TRY(LabelImage used, read_label_image(path));
-    SR_CHECK(check_view(path, used.size, depth_size(frame)));
-    if (used.size != depth_size(frame))
-        used.numbers = nearest_pixels(used.numbers, used.size, depth_size(frame));
-    for (size_t i = 0; i < used.numbers.size(); ++i)
-        images.depth[i] = used.numbers[i] ? images.depth[i] : 0;
+    SR_TRY(const std::vector<uint16_t> used, numbers_of(pictures_[frame].used, frame));
+    for (size_t i = 0; i < used.size(); ++i)
+        images.depth[i] = used[i] ? images.depth[i] : 0;
     return {};
 }
 

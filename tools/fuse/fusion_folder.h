@@ -73,6 +73,7 @@ class FusionFolder {
     ImageSize depth_size(size_t frame) const;
     Result<DepthImages> load_view(const View& view) const;
     Status load_depth(size_t frame, Loaded& loaded) const;
+    Result<std::vector<uint16_t>> numbers_of(const Path& path, size_t frame) const;
     Status load_labels(size_t frame, DepthImages& images) const;
     Status load_colors(size_t frame, DepthImages& images) const;
     Status mask_depth(size_t frame, DepthImages& images) const;
