@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/job/drawing.h"
-#include "engine/job/run_folder.h"
 
 #include "engine/format/buffer_folder.h"
 #include "engine/format/image.h"

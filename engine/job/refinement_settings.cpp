@@ -345,7 +345,7 @@ Result<Json> refinement_settings(const Refinement& r, const Device& device)
                   {"seed", o.renderer.seed},
                   {"format", o.encoding.jpeg ? "jpeg" : "png"},
                   {"quality", o.encoding.jpeg ? o.encoding.quality : 0}};
-    if (r.settings.frame_history > 0) // not there without, so that runs of earlier versions go on
+    if (r.settings.frame_history > 0) // not there where it says nothing
         settings["frame_history"] = r.settings.frame_history;
     settings.update(encoding_json(o.encoding)); // likewise
     settings.update(device_key(device));

@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "tools/dataset/picture_classes.h"
-#include "tools/fuse/frame_pictures.h"
 #include "tools/fuse/sweep_surface.h"
 
 #include <functional>
