@@ -99,7 +99,7 @@ TEST_F(CliAlong, tiles_within_the_horizon_have_the_bytes_of_the_order_of_tiles)
     EXPECT_EQ(std::ranges::count(grid->generated, 1), int64_t(grid->cells.size()));
     EXPECT_EQ(report["cells"], grid->cells.size());
     EXPECT_EQ(report["tiles"], json_of(contents(path("out/index.json")))["tiles"].size());
-    EXPECT_LE(report["tiles"], tiles_in("out")); // those that they see lie beside them
+    EXPECT_EQ(report["tiles"], tiles_in("out"));
     EXPECT_LT(grid->cells.size(), road(60).cells.size());
     for (const Cell& cell : road(60).cells) { // whatever is within the horizon is there
         const double x = (cell[0] + 0.5) * 0.6, y = (cell[1] + 0.5) * 0.6;
@@ -155,17 +155,44 @@ TEST_F(CliAlong, a_run_that_was_killed_goes_on_to_the_same_bytes)
     EXPECT_EQ(bytes("whole"), bytes("stopped"));
 }
 
-TEST_F(CliAlong, a_damaged_tile_is_made_again)
+TEST_F(CliAlong, a_tile_that_is_missing_or_damaged_is_made_again)
 {
-    ASSERT_EQ(stop_after("out", 4, SIGKILL), 128 + SIGKILL);
-    for (const auto& [name, hash] : bytes("out"))
-        if (name.ends_with(".sgrid")) {
-            folder_.put("out/" + name, "damaged");
-            break;
-        }
-    run(line("out"));
     run(line("whole"));
-    EXPECT_EQ(bytes("whole"), bytes("out"));
+    ASSERT_EQ(stop_after("part", 15, SIGKILL), 128 + SIGKILL);
+    const auto spoil = [&](std::string_view output, const std::string& name, bool damage) {
+        std::filesystem::remove(folder_ / output / name);
+        if (damage)
+            folder_.put(std::string(output) + "/" + name, "damaged");
+    };
+    for (const char* output : {"part", "whole"}) // one that goes on, one that is finished
+        for (const auto& [name, hash] : bytes(output))
+            for (const bool damage : {false, true}) {
+                for (const char* end : {"", ".run"}) {
+                    std::filesystem::remove_all(folder_ / (std::string("out") + end));
+                    std::filesystem::copy(folder_ / (std::string(output) + end), folder_ / (std::string("out") + end),
+                                          std::filesystem::copy_options::recursive);
+                }
+                spoil("out", name, damage);
+                run(line("out"));
+                EXPECT_EQ(bytes("whole"), bytes("out")) << output << " " << name << " " << damage;
+            }
+}
+
+// killed, or the disk was full, between the index and the run's end
+TEST_F(CliAlong, a_run_whose_index_is_written_goes_on)
+{
+    run(line("out"));
+    const auto whole = bytes("out");
+    Json summary = json_of(contents(path("out.run/run.json")));
+    summary["state"] = "running";
+    summary.erase("results");
+    folder_.put("out.run/run.json", summary.dump());
+    EXPECT_NE(semrover_program(line("out", "--seed 5")).err.find("holds a run with other settings"), std::string::npos);
+    for (const char* again : {"", "-y"}) {
+        folder_.put("out.run/run.json", summary.dump());
+        run(line("out", again));
+        EXPECT_EQ(bytes("out"), whole);
+    }
 }
 
 TEST_F(CliAlong, memory_does_not_grow_with_the_length)
@@ -210,7 +237,7 @@ TEST_F(CliAlong, what_makes_no_sense_is_refused)
     refused(line("road.sgrid"), 3, "is a file");
     run(line("out", "--seed 5 -y"));
     EXPECT_EQ(json_of(contents(path("out/index.json")))["metadata"]["seed"], "5");
-    EXPECT_LE(json_of(contents(path("out/index.json")))["tiles"].size(), tiles_in("out"));
+    EXPECT_EQ(json_of(contents(path("out/index.json")))["tiles"].size(), tiles_in("out"));
     std::filesystem::create_directory(folder_ / "full");
     folder_.put("full/mine.txt", "x");
     EXPECT_EQ(semrover_program(line("full")).code, 2);

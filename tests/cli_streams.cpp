@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // needs: programs
 // outputs that are closed or full, and a cache that cannot be kept
+#include "runtime/base/json.h"
 #include "tests/support/program.h"
 
 namespace semrover {
@@ -71,6 +72,32 @@ TEST(cli_streams, a_folder_of_results_has_the_mode_that_the_umask_leaves)
     std::filesystem::remove_all(out);
     ASSERT_EQ(run_program_line("umask 027; exec " SEMROVER_BINARY, line).code, 0);
     EXPECT_EQ(std::filesystem::status(out).permissions(), perms(0750));
+}
+
+TEST(cli_streams, names_that_are_no_utf8_are_names)
+{
+    const ScratchFolder folder;
+    const std::string odd = "n\xff\xfe";
+    const auto path = [&](const std::string& name) { return "'" + (folder / odd / (name + odd)).string(); };
+    std::filesystem::create_directory(folder / odd);
+    std::filesystem::copy(kGrid, folder / odd / ("street" + odd + ".sgrid"));
+    folder.put(odd + "/path" + odd + ".tum", "0 1 0 1.5 0.5 -0.5 0.5 -0.5\n1 2 0 1.5 0.5 -0.5 0.5 -0.5\n");
+    const std::string street = path("street") + ".sgrid'", small = path("small") + ".sgrid'";
+    const std::string model = SEMROVER_SOURCE_DIR "/tests/golden/sampling_ddpm/model";
+    const std::string generate = " -m " + model + " --steps 1 --region-size 40 --coverage-threshold 12 --json -o ";
+    for (const std::string& line :
+         {"inspect --json " + street, "edit " + street + " --cut --box 0,-40,-5:12,40,20 --json -o " + small,
+          "generate " + small + generate + path("made") + ".sgrid'",
+          "render " + path("made") + ".sgrid' --path " + path("path") + ".tum' -W 32 -H 24 --json -o " +
+              path("frames") + "'",
+          "convert " + path("made") + ".sgrid' " + path("made") + ".ply' --json",
+          "convert " + path("frames") + "/transforms.json' " + path("cameras") + ".tum' --json",
+          "page --grid " + street + " --json -o " + path("page") + ".html'"})
+        for (int again = 0; again < 2; ++again) {
+            const ProgramResult result = semrover_program(line + (again ? " -y" : ""));
+            EXPECT_EQ(result.code, 0) << line << "\n" << result.err;
+            EXPECT_TRUE(parse_json(result.out, "output")) << line << "\n" << result.out;
+        }
 }
 
 TEST(cli_streams, names_that_are_too_long_are_refused_by_name)

@@ -421,6 +421,7 @@ TEST(engine_edit, scripts_that_make_no_sense_are_refused_with_their_place)
         {R"([{"op": "insert", "at": [0, 0, 0]}])", "the stamp is missing"},
         {R"([{"op": "insert", "stamp": "/etc/passwd", "at": [0, 0, 0]}])", "operation 1: stamp: expected a file in"},
         {R"([{"op": "insert", "stamp": "a/../../x", "at": [0, 0, 0]}])", "found 'a/../../x'"},
+        {R"([{"op": "insert", "stamp": "a\u0000b", "at": [0, 0, 0]}])", "operation 1: stamp: expected a file in"},
         {R"([{"op": "insert", "stamp": "x", "at": [0, 0, 0], "rotate": 45}])", "0, 90, 180 or 270"},
         {R"([{"op": "copy", "class": "car"}])", "`by` is missing"},
         {R"([{"op": "copy", "class": "car", "by": [1, 1, 1], "points": "maybe"}])", "keep or regenerate"},
@@ -429,6 +430,47 @@ TEST(engine_edit, scripts_that_make_no_sense_are_refused_with_their_place)
     const ScratchFolder folder;
     for (const auto& [text, message] : cases)
         EXPECT_TRUE(says(read_edit_script(folder.put("x.json", text)), message)) << text;
+}
+
+TEST(engine_edit, a_link_does_not_lead_out_of_a_script_s_folder)
+{
+    const ScratchFolder folder;
+    const auto script = [&](const std::string& stamp) {
+        return read_edit_script(
+            folder.put("in/x.json", fmt::format(R"([{{"op": "insert", "stamp": "{}", "at": [0, 0, 0]}}])", stamp)));
+    };
+    ASSERT_TRUE(write_grid(folder / "car.sgrid", grid_of(street())));
+    ASSERT_TRUE(make_folder(folder / "in/stamps"));
+    ASSERT_TRUE(write_grid(folder / "in/stamps/car.sgrid", grid_of(street())));
+    std::filesystem::create_symlink("..", folder / "in/up");
+    std::filesystem::create_symlink("../car.sgrid", folder / "in/out.sgrid");
+    std::filesystem::create_symlink("stamps/car.sgrid", folder / "in/stays.sgrid");
+    EXPECT_TRUE(script("stays.sgrid"));
+    EXPECT_TRUE(script((folder / "in/stamps/car.sgrid").string()));
+    for (const char* stamp : {"up/car.sgrid", "out.sgrid"})
+        EXPECT_TRUE(says(script(stamp), "expected a file in the script's folder")) << stamp;
+}
+
+TEST(engine_edit, copies_of_copies_end_early)
+{
+    for (const bool keep : {false, true}) {
+        VoxelGrid grid = grid_of(street());
+        add_points(grid);
+        GridEditor editor(grid);
+        Status status;
+        int copies = 0;
+        for (; status && copies < 30; ++copies) {
+            EditOperation o;
+            o.kind = Kind::copy;
+            o.by = {8 * 0.6 * (1 << copies), 0.0, 0.0};
+            o.where.box = box({0, 0, 0}, {8 * (1 << copies) - 1, 5, 1});
+            o.keep_points = keep;
+            status = editor.apply(o);
+        }
+        EXPECT_TRUE(says(status, keep ? "copy: an edit of a grid of 54 voxels may make it one of at most 1048792"
+                                      : "at most 4194520"));
+        EXPECT_EQ(copies, keep ? 15 : 17); // 54 voxels at the first
+    }
 }
 
 // ---- undo

@@ -47,6 +47,23 @@ TEST(engine_run_folder, a_link_is_refused_by_name_and_its_target_stays)
         }
 }
 
+TEST(engine_run_folder, a_folder_that_is_a_link_is_refused)
+{
+    const ScratchFolder folder;
+    fs::create_directory(folder / "target");
+    for (const char* target : {"target", "nowhere"}) {
+        fs::create_symlink(target, folder / "run");
+        for (const bool restart : {false, true})
+            EXPECT_TRUE(says(RunFolder::open(folder / "run", kSettings, restart), "run' is a link"));
+        fs::remove(folder / "run");
+    }
+    EXPECT_TRUE(fs::is_empty(folder / "target"));
+    EXPECT_FALSE(fs::exists(folder / "nowhere"));
+    fs::create_directory_symlink("target", folder / "run");
+    EXPECT_TRUE(RunFolder::open(folder / "run/", kSettings, false)); // who names it so means what it leads to
+    EXPECT_TRUE(fs::exists(folder / "target/run.json"));
+}
+
 TEST(engine_run_folder, a_link_to_nothing_creates_nothing)
 {
     for (const char* name : {"journal.jsonl", "lock"}) {

@@ -230,11 +230,7 @@ TEST(SafetensorsReject, too_many_names_end_early)
     header = "{";
     for (uint64_t i = 0; i <= kMaxTensors; ++i)
         header.append(i ? "," : "").append(entry(std::to_string(i), "U8", "0", "0,0"));
-    const auto start = std::chrono::steady_clock::now();
-    EXPECT_TRUE(says(Safetensors::open(folder.put("x", safetensors_bytes(header + "}"))), "more than 1000000 tensors"));
-    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-    RecordProperty("seconds", std::to_string(seconds.count()));
-    EXPECT_LT(seconds.count(), 20.0); // under 1 s in a release build, 9 s without optimisation
+    EXPECT_TRUE(says(Safetensors::open(folder.put("x", safetensors_bytes(header + "}"))), "more than 65536 tensors"));
 }
 
 TEST(SafetensorsReject, a_file_cut_at_any_byte_or_with_any_byte_changed_never_crashes)

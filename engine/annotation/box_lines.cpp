@@ -103,9 +103,8 @@ std::string box_line(const DriveRecord::Picture& picture, std::span<const SeenOb
     OrderedJson list = OrderedJson::array();
     for (const SeenObject& o : objects)
         list.push_back(object_line(o, world_to_vehicle, world_to_camera));
-    return OrderedJson{
-        {"time", picture.time}, {"camera", picture.camera}, {"number", picture.number}, {"objects", std::move(list)}}
-        .dump();
+    return json_text(OrderedJson{
+        {"time", picture.time}, {"camera", picture.camera}, {"number", picture.number}, {"objects", std::move(list)}});
 }
 
 Result<std::vector<SeenPicture>> read_box_lines(const Path& file)

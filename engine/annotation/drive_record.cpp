@@ -200,14 +200,13 @@ Status write_drive_record(const Path& folder, const DriveRecord& record)
 {
     std::string poses, times;
     for (const DriveRecord::Moment& m : record.moments)
-        poses += nlohmann::ordered_json{{"time", m.time},
-                                        {"position", translation_of(m.vehicle_to_world)},
-                                        {"rotation", quaternion_of(m.vehicle_to_world)}}
-                     .dump() +
+        poses += json_text(nlohmann::ordered_json{{"time", m.time},
+                                                  {"position", translation_of(m.vehicle_to_world)},
+                                                  {"rotation", quaternion_of(m.vehicle_to_world)}}) +
                  "\n";
     for (const DriveRecord::Picture& p : record.pictures)
-        times += nlohmann::ordered_json{{"time", p.time}, {"camera", p.camera}, {"number", p.number}}.dump() + "\n";
-    SR_CHECK(write_file_atomically(folder / kDriveRecordFiles[0], calibration_json(record).dump(1) + "\n"));
+        times += json_text(nlohmann::ordered_json{{"time", p.time}, {"camera", p.camera}, {"number", p.number}}) + "\n";
+    SR_CHECK(write_file_atomically(folder / kDriveRecordFiles[0], json_text(calibration_json(record), 1) + "\n"));
     SR_CHECK(write_file_atomically(folder / kDriveRecordFiles[1], poses));
     return write_file_atomically(folder / kDriveRecordFiles[2], times);
 }

@@ -36,7 +36,7 @@ Status read_ftheta(const Json& json, Intrinsics& k, std::string_view where)
     if (!backward && reference != "ANGLE_TO_PIXELDIST")
         return fail(ErrorCode::bad_input,
                     "{}: reference_poly: expected \"PIXELDIST_TO_ANGLE\" or \"ANGLE_TO_PIXELDIST\", found {}", where,
-                    printable(reference.dump(-1, ' ', true), 60));
+                    printable(json_text(reference, -1, true), 60));
     k.distortion = {};
     SR_CHECK(
         read_polynomial(json, backward ? "pixeldist_to_angle_poly" : "angle_to_pixeldist_poly", k.distortion, where));

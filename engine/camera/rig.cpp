@@ -43,7 +43,7 @@ Result<CameraModel> read_model(const Json& json, std::string_view where)
         return fail(ErrorCode::bad_input,
                     "{}: model {} is not supported, expected \"pinhole\", \"opencv\", \"fisheye\", "
                     "\"equirectangular\" or \"ftheta\"",
-                    where, printable(model.dump(-1, ' ', true), 60));
+                    where, printable(json_text(model, -1, true), 60));
     return *found;
 }
 
@@ -160,7 +160,7 @@ Result<std::optional<Shutter>> read_shutter(const Json& json, std::string_view w
         direction.is_string() ? shutter_direction_of(direction.get_ref<const std::string&>()) : std::nullopt;
     if (!found)
         return fail(ErrorCode::bad_input, "{}: direction: expected \"down\", \"up\", \"right\" or \"left\", found {}",
-                    where, printable(direction.dump(-1, ' ', true), 60));
+                    where, printable(json_text(direction, -1, true), 60));
     Shutter shutter{.direction = *found};
     if (json.contains("start")) {
         SR_TRY(shutter.start, read_microseconds(json, "start", -1'000'000, where));
@@ -287,7 +287,7 @@ Result<PathAxes> read_path_axes(const Json& file, std::string_view where)
     if (file["path_axes"] == "vehicle")
         return PathAxes::vehicle;
     return fail(ErrorCode::bad_input, "{}: path_axes: expected \"camera\" or \"vehicle\", found {}", where,
-                printable(file["path_axes"].dump(-1, ' ', true), 60));
+                printable(json_text(file["path_axes"], -1, true), 60));
 }
 
 } // namespace

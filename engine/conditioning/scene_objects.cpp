@@ -173,7 +173,7 @@ Status write_objects(const Path& path, std::span<const SceneObject> objects)
 {
     std::string text = fmt::format("{{\"format\": \"{}\", \"version\": 1, \"objects\": [", kFormat);
     for (size_t i = 0; i < objects.size(); ++i)
-        text += (i ? ",\n " : "\n ") + object_json(objects[i]).dump();
+        text += (i ? ",\n " : "\n ") + json_text(object_json(objects[i]));
     return write_file_atomically(path, text + "\n]}\n");
 }
 

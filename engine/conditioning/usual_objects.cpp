@@ -45,7 +45,7 @@ Result<std::vector<std::array<double, 3>>> tints_at(const Json& json, std::strin
         return fail(ErrorCode::bad_input, "{}: tints: expected a list of at most {} colours", where, kMaxTints);
     std::vector<std::array<double, 3>> tints;
     for (const Json& tint : list) {
-        SR_TRY(const auto color, parse_tint(tint.is_string() ? tint.get<std::string>() : tint.dump(), where));
+        SR_TRY(const auto color, parse_tint(tint.is_string() ? tint.get<std::string>() : json_text(tint), where));
         tints.push_back(color);
     }
     return tints;

@@ -168,7 +168,7 @@ Status GltfDocument::walk(const Json& index, const std::array<double, 16>& paren
 {
     const Json* node = entry("nodes", index);
     if (!node)
-        return fail(ErrorCode::bad_input, "{}: there is no node {}", where_, printable(index.dump(-1, ' ', true), 60));
+        return fail(ErrorCode::bad_input, "{}: there is no node {}", where_, printable(json_text(index, -1, true), 60));
     const auto local = local_transform(*node);
     if (!local)
         return fail(ErrorCode::bad_input, "{}: node {}: no transform", where_, index.get<uint64_t>());

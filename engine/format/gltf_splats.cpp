@@ -278,7 +278,7 @@ Status write_splats_glb(const Path& path, const Splats& s)
                        {"accessors", w.accessors},
                        {"bufferViews", w.views},
                        {"buffers", {{{"byteLength", w.binary.size()}}}}};
-    std::string text = json.dump();
+    std::string text = json_text(json);
     text.append((4 - text.size() % 4) % 4, ' ');
     const uint64_t total = 12 + 8 + text.size() + 8 + w.binary.size(); // floats: whole words
     if (total > 0xffffffffu)

@@ -60,7 +60,7 @@ Result<uint8_t> target_of(const Json& value, const std::string& where)
             return kEmpty;
     }
     return fail(ErrorCode::bad_input, "{}: expected a class (name or 0 to {}), null or \"free\", found {}", where,
-                kClassCount - 1, printable(value.dump(-1, ' ', true), 60));
+                kClassCount - 1, printable(json_text(value, -1, true), 60));
 }
 
 Result<LabelTable::Label> label_of(const std::string& key, const Json& value, const std::string& where)
@@ -73,7 +73,7 @@ Result<LabelTable::Label> label_of(const std::string& key, const Json& value, co
         const auto name = value.find("name"), own = value.find("class");
         if (!label.number || value.size() != 2 || name == value.end() || !name->is_string() || own == value.end())
             return fail(ErrorCode::bad_input, "{}: expected {{\"name\": .., \"class\": ..}} of a number, found {}",
-                        where, printable(value.dump(-1, ' ', true), 60));
+                        where, printable(json_text(value, -1, true), 60));
         label.name = name->get<std::string>();
         target = &*own;
     }

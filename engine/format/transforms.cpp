@@ -552,7 +552,7 @@ Status write_transforms(const Path& path, const CameraPath& cameras, const Trans
     if (!cameras.sensors.empty())
         file["rig"] = rig_json(cameras.sensors);
     file["frames"] = std::move(list);
-    return write_file_atomically(path, file.dump(1) + "\n");
+    return write_file_atomically(path, json_text(file, 1) + "\n");
 }
 
 } // namespace semrover

@@ -272,7 +272,7 @@ Status DrawingStore::write_cameras(const CameraPath& path) const
 {
     MadeFiles files;
     for (const LidarSensor& lidar : path.lidars) {
-        const std::string text = sweeps_json(path, lidar.name).dump() + "\n";
+        const std::string text = json_text(sweeps_json(path, lidar.name)) + "\n";
         SR_CHECK(files.add(run_.path() / lidar.name / kSweepsName, std::as_bytes(std::span(text))));
     }
     SR_CHECK(files.commit());

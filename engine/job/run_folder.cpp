@@ -56,13 +56,15 @@ void warn_without_locks(const Path& folder, int error)
 // the settings and the state of a run.json
 Result<Json> read_summary(const Path& path)
 {
-    SR_TRY(Json summary, read_json(path));
-    if (!summary.is_object() || !summary.value("settings", Json()).is_object() ||
-        !summary.value("state", Json()).is_string())
+    auto summary = read_json(path);
+    if (!summary)
+        return fail(summary.error().code, "{}; start over with `replace`", summary.error().message);
+    if (!summary->is_object() || !summary->value("settings", Json()).is_object() ||
+        !summary->value("state", Json()).is_string())
         return fail(ErrorCode::bad_input,
                     "{}: expected an object with the settings and the state of a run; start over with `replace`",
                     quote_path(path));
-    return summary;
+    return std::move(*summary);
 }
 
 tl::unexpected<Error> other_settings(const Path& folder, bool finished)
@@ -116,6 +118,10 @@ Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool
     if (shards)
         return fail(ErrorCode::usage, "{} is a shard set, which is read only: expected another output",
                     quote_path(shards->folder()));
+    std::error_code ignored;
+    if (fs::is_symlink(folder, ignored))
+        return fail(ErrorCode::bad_input, "{} is a link: expected the folder itself, or its name with a / behind it",
+                    quote_path(folder));
     SR_CHECK(make_folder(folder));
     SR_CHECK(run.refuse_links());
     SR_CHECK(run.lock());
@@ -186,7 +192,7 @@ Status RunFolder::start()
     fs::remove(path_ / "journal.jsonl", ignored);
     fs::remove(path_ / "run.json", ignored);
     return write_file_atomically(path_ / "run.json",
-                                 Json{{"settings", settings_}, {"state", "running"}}.dump(1) + "\n");
+                                 json_text(Json{{"settings", settings_}, {"state", "running"}}, 1) + "\n");
 }
 
 // a line that is not whole (the process died while writing it) ends the journal; the file is cut there
@@ -215,7 +221,7 @@ Status RunFolder::read_journal()
 
 Status RunFolder::append(const Json& entry)
 {
-    const std::string line = entry.dump() + "\n";
+    const std::string line = json_text(entry) + "\n";
     int error = journal_.write(std::as_bytes(std::span(line)));
     if (!error)
         error = journal_.flush();
@@ -241,7 +247,7 @@ void RunFolder::drop_if_empty()
 Status RunFolder::finish(const Json& results)
 {
     const Json summary{{"settings", settings_}, {"state", "finished"}, {"results", results}};
-    SR_CHECK(write_file_atomically(path_ / "run.json", summary.dump(1) + "\n"));
+    SR_CHECK(write_file_atomically(path_ / "run.json", json_text(summary, 1) + "\n"));
     std::error_code ignored; // what stays only costs space
     for (const std::string& name : contents_.pieces)
         fs::remove_all(path_ / name, ignored);

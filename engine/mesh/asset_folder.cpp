@@ -112,8 +112,7 @@ Result<Path> AssetFolder::find(std::string_view name, std::string_view where)
     if (error)
         return fail(ErrorCode::bad_input, "{}: refers to {}, which is missing: {}", where, quote(name),
                     error.message());
-    const Path folder = fs::canonical(folder_, error);
-    if (error || std::ranges::mismatch(folder, path).in1 != folder.end())
+    if (!lies_inside(folder_, path))
         return fail(ErrorCode::bad_input, "{}: refers to {}, which leads out of its folder", where, quote(name));
     if (found != named)
         add_warning(warnings, fmt::format("{}: refers to {}; {} is taken", where, quote(name), quote_path(*found)));

@@ -241,7 +241,7 @@ Result<std::string> GlbWriter::write()
     if (binary_.size() > kMaxBytes)
         return fail(ErrorCode::bad_input, "{}: {} bytes, a GLB file holds 4 GiB at most", where_, binary_.size());
     std::string chunks;
-    append_chunk(chunks, "JSON", json.dump(), ' ');
+    append_chunk(chunks, "JSON", json_text(json), ' ');
     append_chunk(chunks, "BIN", std::move(binary_), '\0');
     std::string file = "glTF";
     const uint32_t numbers[2] = {2, uint32_t(chunks.size() + 12)};

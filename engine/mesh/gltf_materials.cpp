@@ -120,7 +120,7 @@ Status GltfMaterials::read_alpha(const Json& json, const std::string& where, Mat
     SR_TRY(const auto cutoff, optional_number(json, "alphaCutoff", where));
     if (mode != "OPAQUE" && mode != "MASK" && mode != "BLEND")
         return fail(ErrorCode::bad_input, "{}: alphaMode: expected OPAQUE, MASK or BLEND, found {}", where,
-                    printable(mode.dump(-1, ' ', true), 40));
+                    printable(json_text(mode, -1, true), 40));
     material.alpha_cutoff = mode == "OPAQUE" ? 0 : mode == "MASK" ? float(std::max(cutoff.value_or(0.5), 0.0)) : 0.5f;
     const bool textured = material.texture >= 0 && !mesh_.textures[size_t(material.texture)].alpha.empty();
     if (material.alpha_cutoff > 0 && textured)

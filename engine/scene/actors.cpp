@@ -121,7 +121,7 @@ std::string actor_text(const Actor& actor, const Path& folder)
                        {"class", std::string(kPalette[actor.label].name)},
                        {"size", written_lengths(actor.size)},
                        {"from", from_json(actor.from, folder)}};
-    std::string text = head.dump();
+    std::string text = json_text(head);
     text.pop_back(); // the brace that ends it
     text += ", \"poses\": [";
     for (size_t i = 0; i < actor.poses.size(); ++i) {
@@ -129,7 +129,7 @@ std::string actor_text(const Actor& actor, const Path& folder)
         const Json line = {{"time", actor.poses[i].time},
                            {"position", written_lengths(translation_of(pose))},
                            {"rotation", written_rotation(pose)}};
-        text += (i ? ",\n  " : "\n  ") + line.dump();
+        text += (i ? ",\n  " : "\n  ") + json_text(line);
     }
     return text + "]}";
 }

@@ -16,7 +16,7 @@ Result<const Json*> things_in(const Json& file, const char* format, std::span<co
         return fail(ErrorCode::bad_input, "{}: expected an object with \"format\": \"{}\"", where, format);
     if (file.value("version", Json()) != 1)
         return fail(ErrorCode::bad_input, "{}: version: expected 1, found {}", where,
-                    file.value("version", Json()).dump());
+                    json_text(file.value("version", Json())));
     SR_CHECK(check_keys(file, keys, where));
     const auto list = file.find(name);
     if (list == file.end() || !list->is_array() || list->size() > most)

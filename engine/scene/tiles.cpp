@@ -244,7 +244,7 @@ Status write_tile_index(const Path& folder, const TileFolderInfo& info, const st
                      {"has_points", info.has_points},
                      {"metadata", info.metadata},
                      {"tiles", list}};
-    return write_file_atomically(folder / "index.json", index.dump() + "\n");
+    return write_file_atomically(folder / "index.json", json_text(index) + "\n");
 }
 
 std::map<TileIndex, VoxelGrid> cut_tiles(const VoxelGrid& grid, int32_t edge)

@@ -43,7 +43,7 @@ std::optional<uint32_t> moment_of(std::string_view digits)
 std::string row_text(const ShardMember& m, bool with_offset)
 {
     const std::string offset = with_offset ? fmt::format("{}, ", m.offset) : "";
-    return fmt::format("[{}, {}{}, \"{}\"]", Json(m.path).dump(), offset, m.size, hash_text(m.hash));
+    return fmt::format("[{}, {}{}, \"{}\"]", json_text(Json(m.path)), offset, m.size, hash_text(m.hash));
 }
 
 void append_rows(std::string& text, const std::vector<ShardMember>& members, bool with_offset)
@@ -66,7 +66,7 @@ Result<uint64_t> read_hash(const Json& value, std::string_view where)
     if (text && text->size() == 16 &&
         std::from_chars(text->data(), text->data() + 16, hash, 16).ptr == text->data() + 16 && hash_text(hash) == *text)
         return hash;
-    return wrong(where, "expected a hash of 16 hexadecimal digits, found {}", quote(value.dump(), 60));
+    return wrong(where, "expected a hash of 16 hexadecimal digits, found {}", quote(json_text(value), 60));
 }
 
 // an object with these keys and no other
@@ -89,7 +89,7 @@ Result<ShardMember> read_row(const Json& row, bool with_offset, std::string_view
     ShardMember member{row[0].get<std::string>()};
     for (size_t i = 1; i <= numbers; ++i)
         if (!row[i].is_number_unsigned())
-            return wrong(where, "expected a whole number of bytes, found {}", quote(row[i].dump(), 60));
+            return wrong(where, "expected a whole number of bytes, found {}", quote(json_text(row[i]), 60));
     member.offset = with_offset ? row[1].get<uint64_t>() : 0;
     member.size = row[numbers].get<uint64_t>();
     SR_TRY(member.hash, read_hash(row.back(), where));
@@ -119,12 +119,12 @@ Result<Shard> read_shard(const Json& json, size_t number, std::string_view key_p
     const std::string where = fmt::format("{}: {}", file, shard_name(number));
     SR_CHECK(check_object(json, {"file", "bytes", "members"}, where));
     if (json["file"] != shard_name(number))
-        return wrong(where, "file is {}, expected this name", quote(json["file"].dump(), 60));
+        return wrong(where, "file is {}, expected this name", quote(json_text(json["file"]), 60));
     SR_CHECK(check_array(json["members"], "members", where));
     Shard shard;
     const Json& bytes = json["bytes"];
     if (!bytes.is_number_unsigned() || bytes.get<uint64_t>() % kTarBlock)
-        return wrong(where, "bytes is {}, expected a multiple of {}", quote(bytes.dump(), 60), kTarBlock);
+        return wrong(where, "bytes is {}, expected a multiple of {}", quote(json_text(bytes), 60), kTarBlock);
     shard.bytes = bytes.get<uint64_t>();
     uint64_t end = 0;
     for (const Json& row : json["members"]) {
@@ -265,7 +265,7 @@ Result<ShardIndex> read_shard_index(const Path& folder)
         return wrong(file, "expected a {} of version {}", kShardFormat, kVersion);
     const Json& prefix = json["key_prefix"];
     if (!prefix.is_string() || !is_key_prefix(prefix.get_ref<const std::string&>()))
-        return wrong(file, "key_prefix is {}, expected letters, digits, '_' and '-'", quote(prefix.dump(), 60));
+        return wrong(file, "key_prefix is {}, expected letters, digits, '_' and '-'", quote(json_text(prefix), 60));
     ShardIndex index{prefix.get<std::string>(), {}, {}};
     const Json& shards = json["shards"];
     SR_CHECK(check_array(shards, "shards", file));

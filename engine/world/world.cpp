@@ -79,7 +79,7 @@ Status World::open_tiles()
         settings.erase("driver");
     }
     Hash base;
-    base.add(settings.dump());
+    base.add(json_text(settings));
     base.add(std::as_bytes(std::span(&request_.seed, 1)));
     SR_TRY(WorldObjects objects, WorldObjects::create(s.model, request_.objects, request_.seed));
     std::unique_ptr<TileStore> store;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/base/inner_path.h"
 
-#include <filesystem>
+#include <algorithm>
 
 namespace semrover {
 
@@ -12,6 +12,14 @@ bool leads_inside(std::string_view name)
         return false;
     const std::filesystem::path normal = std::filesystem::path(name).lexically_normal();
     return !normal.has_root_path() && *normal.begin() != "..";
+}
+
+bool lies_inside(const std::filesystem::path& folder, const std::filesystem::path& path)
+{
+    std::error_code error, none;
+    const auto outer = std::filesystem::canonical(folder.empty() ? "." : folder, error);
+    const auto inner = std::filesystem::canonical(path, none);
+    return !error && !none && std::ranges::mismatch(outer, inner).in1 == outer.end();
 }
 
 } // namespace semrover

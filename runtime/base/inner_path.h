@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <string_view>
 
 namespace semrover {
@@ -10,5 +11,8 @@ namespace semrover {
 // aside: it is not empty, has no root (on Windows neither a drive nor a leading slash), and climbs no further up than
 // it went down.
 bool leads_inside(std::string_view name);
+
+// Whether what is there lies in a folder, links followed
+bool lies_inside(const std::filesystem::path& folder, const std::filesystem::path& path);
 
 } // namespace semrover

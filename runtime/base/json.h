@@ -52,6 +52,13 @@ Result<Json> read_json(const Path& path, const JsonLimits& limits = {});
 Status parse_json_records(std::string_view text, std::string_view where, const JsonLimits& limits,
                           const std::function<Status(const Json& value, size_t number)>& record);
 
+// The text of a value on one line, or with an indent. Names of files may be no UTF-8: those bytes become U+FFFD.
+template <typename Value>
+std::string json_text(const Value& value, int indent = -1, bool ascii = false)
+{
+    return value.dump(indent, ' ', ascii, Value::error_handler_t::replace);
+}
+
 // a float's shortest digits: 0.18215, not 0.18215000629425049
 Json short_number(float value);
 

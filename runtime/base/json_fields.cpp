@@ -15,7 +15,7 @@ std::string value_text(const Json& value)
 {
     if (value.is_structured() && !(value.is_array() && std::ranges::none_of(value, &Json::is_structured)))
         return fmt::format("an {}", value.type_name());
-    return printable(value.dump(-1, ' ', true, Json::error_handler_t::replace), 60);
+    return printable(json_text(value, -1, true), 60);
 }
 
 bool is_integer_in(const Json& value, uint32_t low, uint32_t high)
@@ -119,7 +119,7 @@ void JsonFields::only(const char* name, const Json& supported)
         return;
     if (value->is_array() && std::ranges::all_of(*value, [&](const Json& v) { return v == supported; }))
         return;
-    refuse(name, supported.is_null() ? "none" : supported.dump());
+    refuse(name, supported.is_null() ? "none" : json_text(supported));
 }
 
 void JsonFields::ignore(std::initializer_list<const char*> names)

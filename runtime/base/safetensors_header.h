@@ -18,7 +18,7 @@ namespace semrover {
 
 // format: https://github.com/huggingface/safetensors (u64 little-endian header length, JSON header, data)
 constexpr uint64_t kMaxSafetensorsHeader = 100'000'000; // bytes, the reference reader's limit
-constexpr uint64_t kMaxTensors = 1'000'000;
+constexpr uint64_t kMaxTensors = 65'536;
 constexpr uint64_t kMaxMetadataEntries = 65'536;
 constexpr size_t kMaxTensorName = 512; // bytes; metadata keys too
 constexpr size_t kMaxRank = 8;

@@ -61,7 +61,7 @@ Result<Index> read_index(const Path& path)
         if (!file.is_string() || !is_shard_name(file.get_ref<const std::string&>()))
             return fail(ErrorCode::bad_input,
                         "{}: tensor {}: expected a file name such as x-00001.safetensors, found {}", where,
-                        quote(tensor), quote(file.dump(-1, ' ', true), 100));
+                        quote(tensor), quote(json_text(file, -1, true), 100));
         const auto& name = file.get_ref<const std::string&>();
         const auto [entry, is_new] = number_of.try_emplace(name, static_cast<uint32_t>(index.shards.size()));
         if (is_new)

@@ -11,11 +11,6 @@ namespace semrover {
 
 namespace {
 
-std::string json_text(std::string_view text)
-{
-    return Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
 uint64_t bytes_of(const TensorStream& t)
 {
     const Result<uint64_t> bytes = checked_bytes(t.shape, t.dtype);
@@ -31,15 +26,15 @@ std::string header_text(std::span<const TensorStream* const> tensors,
     if (!metadata.empty()) {
         text += "\"__metadata__\":{";
         for (const auto& [key, value] : metadata)
-            text += json_text(key) + ":" + json_text(value) + ",";
+            text += json_text(Json(key)) + ":" + json_text(Json(value)) + ",";
         text.back() = '}';
         text += ',';
     }
     uint64_t offset = 0;
     for (const TensorStream* t : tensors) {
         const uint64_t end = offset + bytes_of(*t);
-        text += fmt::format("{}:{{\"dtype\":\"{}\",\"shape\":[{}],\"data_offsets\":[{},{}]}},", json_text(t->name),
-                            dtype_name(t->dtype), fmt::join(t->shape, ","), offset, end);
+        text += fmt::format("{}:{{\"dtype\":\"{}\",\"shape\":[{}],\"data_offsets\":[{},{}]}},",
+                            json_text(Json(t->name)), dtype_name(t->dtype), fmt::join(t->shape, ","), offset, end);
         offset = end;
     }
     if (text.back() == ',')

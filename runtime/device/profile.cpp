@@ -2,13 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/device/profile.h"
 
+#include "runtime/base/json.h"
+
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <functional>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <set>
 
 namespace semrover {
@@ -46,7 +47,7 @@ Status Profile::write(const std::string& path) const
                          {"dur", e.duration_us},
                          {"args", {{"groups", e.groups}, {"gflop", e.flops / 1e9}, {"tile", e.tile}}}});
     std::ofstream out(path);
-    out << nlohmann::json{{"traceEvents", std::move(trace)}, {"displayTimeUnit", "ms"}}.dump();
+    out << json_text(nlohmann::json{{"traceEvents", std::move(trace)}, {"displayTimeUnit", "ms"}});
     if (!out.flush())
         return fail(ErrorCode::bad_input, "cannot write the profile '{}': {}", path, std::strerror(errno));
     return {};
@@ -76,8 +77,8 @@ std::string Profile::summary() const
         all += total.duration_us;
     std::string out;
     for (const Total& total : sorted)
-        out += fmt::format("{:10.1f} ms {:5.1f} % {:6} x {}\n", total.duration_us / 1e3,
-                           100 * total.duration_us / all, total.count, total.name);
+        out += fmt::format("{:10.1f} ms {:5.1f} % {:6} x {}\n", total.duration_us / 1e3, 100 * total.duration_us / all,
+                           total.count, total.name);
     return out;
 }
 

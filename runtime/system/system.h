@@ -18,6 +18,12 @@ using OrError = tl::expected<T, int>;
 
 std::string message_of(int error);
 
+// Calls of both systems would take the name up to there, and so another file
+inline bool holds_nul(const Path& path)
+{
+    return path.native().find(Path::value_type(0)) != path.native().npos;
+}
+
 struct FileFacts {
     bool regular = false, folder = false;
     uint64_t bytes = 0;

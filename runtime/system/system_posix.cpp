@@ -50,6 +50,8 @@ std::string message_of(int error)
 
 OrError<FileFacts> facts_of(const Path& path)
 {
+    if (holds_nul(path))
+        return tl::unexpected(EINVAL);
     struct stat status;
     if (::stat(path.c_str(), &status) != 0)
         return tl::unexpected(errno);
@@ -58,6 +60,8 @@ OrError<FileFacts> facts_of(const Path& path)
 
 OrError<File> File::open(const Path& path, FileUse use)
 {
+    if (holds_nul(path))
+        return tl::unexpected(EINVAL);
     const int number = ::open(path.c_str(), flags_of(use) | O_CLOEXEC, 0666);
     if (number < 0)
         return tl::unexpected(errno);

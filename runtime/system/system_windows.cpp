@@ -73,6 +73,10 @@ bool is_link(HANDLE handle)
 
 HANDLE open_shared(const Path& path, DWORD access, DWORD disposition, DWORD more)
 {
+    if (holds_nul(path)) {
+        ::SetLastError(ERROR_INVALID_NAME);
+        return INVALID_HANDLE_VALUE;
+    }
     return ::CreateFileW(path.c_str(), access, FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, nullptr,
                          disposition, FILE_ATTRIBUTE_NORMAL | more, nullptr);
 }

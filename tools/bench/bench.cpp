@@ -159,16 +159,16 @@ Status write_profile(Device& device, const std::string& path)
 void print_report(const Json& report, const Globals& globals)
 {
     if (globals.json) {
-        fmt::print("{}\n", report.dump());
+        fmt::print("{}\n", json_text(report));
         return;
     }
     for (const auto& [name, value] : report.items())
-        fmt::print("{:18} {}\n", name, value.is_string() ? value.get<std::string>() : value.dump());
+        fmt::print("{:18} {}\n", name, value.is_string() ? value.get<std::string>() : json_text(value));
 }
 
 void print_line(const Json& object)
 {
-    fmt::print("{}\n", object.dump());
+    fmt::print("{}\n", json_text(object));
     std::fflush(stdout);
 }
 

@@ -264,10 +264,10 @@ class TileBench {
             line["runs"] = timing.runs;
             SR_CHECK(add_code(line, device_, *executable));
             print_line(line);
-            const std::string name = json_of(shape).dump();
-            rates_[name][key.dump()].push_back(line["tflops"]);
+            const std::string name = json_text(json_of(shape));
+            rates_[name][json_text(key)].push_back(line["tflops"]);
             if (!way.slices && way.tile == good_.front().tile)
-                first_[name] = key.dump();
+                first_[name] = json_text(key);
             return {};
         });
     }

@@ -138,7 +138,7 @@ const CLI::App& chosen(const CLI::App& app)
 int show_help(const CLI::App& app, const CLI::ParseError& request)
 {
     if (app.count("--json") > 0 && dynamic_cast<const CLI::CallForHelp*>(&request))
-        fmt::print("{}\n", options_json(chosen(app)).dump());
+        fmt::print("{}\n", json_text(options_json(chosen(app))));
     else
         app.exit(request); // --help, --version
     return report_output();

@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/progress.h"
 
+#include "runtime/base/json.h"
 #include "runtime/system/process.h"
 
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 
 namespace semrover {
 
@@ -134,7 +134,7 @@ std::string Progress::json_line(double now, std::string_view event) const
     }
     if (device_bytes_)
         json["device_bytes"] = *device_bytes_;
-    return json.dump() + "\n";
+    return json_text(json) + "\n";
 }
 
 std::string duration_text(double seconds)

@@ -353,7 +353,7 @@ void report(const Conversion& plan, const ConvertModelOptions& o, const Globals&
     }
     if (globals.json) {
         const Json all{{"output", o.out}, {"components", components}, {"left_out", plan.left_out}};
-        fmt::print("{}\n", all.dump(-1, ' ', false, Json::error_handler_t::replace));
+        fmt::print("{}\n", json_text(all));
     } else if (!plan.left_out.empty()) {
         fmt::print("left out: {} (the text is a constant: conditioning/)\n",
                    printable(fmt::format("{}", fmt::join(plan.left_out, ", ")), 1000));

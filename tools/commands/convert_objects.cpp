@@ -66,7 +66,7 @@ Status guess_objects_of(const ObjectsInput& input, const SceneInputOptions& scen
                     {"objects", objects.size()},
                     {"classes", classes_of(objects)}};
     if (globals.json)
-        fmt::print("{}\n", json.dump(-1, ' ', false, Json::error_handler_t::replace));
+        fmt::print("{}\n", json_text(json));
     else if (!globals.quiet)
         fmt::print("{} objects\n", objects.size());
     return {};
@@ -91,7 +91,7 @@ Status convert_objects(const ObjectsInput& input, BoxFormat format, const Conver
         {"objects", file.objects.size()}, {"classes", classes_of(file.objects)}, {"dropped", file.dropped},
         {"warnings", file.warnings}};
     if (globals.json)
-        fmt::print("{}\n", json.dump(-1, ' ', false, Json::error_handler_t::replace));
+        fmt::print("{}\n", json_text(json));
     else if (!globals.quiet)
         fmt::print("{} to objects: {} objects, {} left out\n", name_of(format), file.objects.size(), file.dropped);
     return {};

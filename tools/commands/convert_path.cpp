@@ -225,10 +225,9 @@ Status convert_path(const Path& in, const Path& out, const ConvertPathOptions& o
         SR_CHECK(more ? write_with_points(to, path, o, format, globals) : write_output(to, path, format));
     print_warnings(path.warnings, globals);
     if (globals.json)
-        fmt::print("{}\n", Json{{"output", printable(to.string())},
-                                {"format", std::string(name_of(format))},
-                                {"frames", path.frames.size()}}
-                               .dump());
+        fmt::print("{}\n", json_text(Json{{"output", printable(to.string())},
+                                          {"format", std::string(name_of(format))},
+                                          {"frames", path.frames.size()}}));
     else if (!globals.quiet)
         fmt::print("{} frames as {}{}\n", path.frames.size(), name_of(format),
                    format == PathFormat::tum     ? ", without intrinsics"

@@ -112,8 +112,8 @@ Json summary(const ConvertSceneOptions& o, const SceneInput& input, SceneFormat 
 void print_summary(const SceneInput& input, const Json& json, SceneFormat to)
 {
     fmt::print("{} to {}: {}\n", facts_of(input.format).name, facts_of(to).name,
-               input.grid ? fmt::format("{} voxels, {} points", json["cells"].dump(), json["points"].dump())
-                          : fmt::format("{} splats", json["splats"].dump()));
+               input.grid ? fmt::format("{} voxels, {} points", json_text(json["cells"]), json_text(json["points"]))
+                          : fmt::format("{} splats", json_text(json["splats"])));
     if (!input.grid)
         return;
     const auto counts = json["labels"];
@@ -156,7 +156,7 @@ Status convert_scene(const ConvertSceneOptions& o, const Globals& globals)
     print_warnings(input.warnings, globals);
     const Json json = summary(o, input, to);
     if (globals.json)
-        fmt::print("{}\n", json.dump(-1, ' ', false, Json::error_handler_t::replace));
+        fmt::print("{}\n", json_text(json));
     else if (!globals.quiet)
         print_summary(input, json, to);
     return {};

@@ -100,7 +100,7 @@ Status devices(const Globals& globals)
     for (const DeviceSummary& d : all)
         list.push_back(describe(d));
     if (globals.json)
-        fmt::print("{}\n", Report{{"devices", list}}.dump(-1, ' ', true));
+        fmt::print("{}\n", json_text(Report{{"devices", list}}, -1, true));
     else
         for (const DeviceSummary& d : all)
             print_text(d);

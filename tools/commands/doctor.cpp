@@ -105,7 +105,7 @@ void print_json(const std::vector<Finding>& findings)
         if (!f.ok && !f.package.empty())
             list.back()["package"] = f.package;
     }
-    fmt::print("{}\n", nlohmann::ordered_json{{"version", kVersion}, {"findings", list}}.dump(-1, ' ', true));
+    fmt::print("{}\n", json_text(nlohmann::ordered_json{{"version", kVersion}, {"findings", list}}, -1, true));
 }
 
 Status doctor(const Globals& globals)

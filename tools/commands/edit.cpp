@@ -140,7 +140,7 @@ Status cut(const EditArguments& o, const Globals& globals)
     SR_CHECK(check_writable(o.out.output, globals.yes));
     SR_TRY(const Json stamp, write_stamp(o.grid, o.cut_where, o.out.output));
     if (globals.json)
-        fmt::print("{}\n", stamp.dump());
+        fmt::print("{}\n", json_text(stamp));
     return {};
 }
 

@@ -16,6 +16,7 @@
 #include "tools/trajectory/camera_path.h"
 #include "tools/trajectory/path_format.h"
 
+#include <algorithm>
 #include <chrono>
 
 namespace semrover {
@@ -225,8 +226,8 @@ Status TilesRun::check() const
             SR_CHECK(refuse_given(*o_.input.command, {&name, 1}, "--along, whose scaffold is a grid of ours"));
     if (o_.generation.dry_run)
         return {};
-    // of a finished run, the settings say whether it is this one
-    if (TileFolder::is_one(o_.output) && !globals_.yes && !finished_results(folder(), Json()))
+    // of a run, the settings say whether it is this one
+    if (TileFolder::is_one(o_.output) && !globals_.yes && !fs::exists(folder() / "run.json"))
         return fail(ErrorCode::usage, "{} exists; -y replaces it", quote(o_.output));
     if (fs::exists(o_.output) && !fs::is_directory(o_.output))
         return fail(ErrorCode::bad_input, "{} is a file; --along writes a folder of tiles", quote(o_.output));
@@ -278,30 +279,48 @@ Result<Json> TilesRun::settings() const
     return settings;
 }
 
-// the same run is done and its tiles are there. usage: tiles of another
+// each tile that the index names is there, as it was written
+bool TilesRun::is_whole() const
+{
+    const auto tiles = TileFolder::open(o_.output);
+    return tiles &&
+           std::ranges::all_of(tiles->tiles(), [&](const auto& entry) { return tiles->read(entry.first).has_value(); });
+}
+
+// the same run is done and its tiles are there; what is not there is made again
 Result<bool> TilesRun::finished_before()
 {
-    if (globals_.yes || !TileFolder::is_one(o_.output))
-        return false;
     SR_TRY(const Json wanted, settings());
-    finished_ = finished_results(folder(), wanted);
-    if (!finished_)
-        return fail(ErrorCode::usage, "{} exists; -y replaces it", quote(o_.output));
-    return true;
+    SR_TRY(RunFolder run, open_run(folder(), wanted, globals_.yes, {{}}, true));
+    run_.emplace(std::move(run));
+    if (run_->results() && is_whole())
+        finished_ = run_->results();
+    return finished_.has_value();
+}
+
+// removes the tiles in the output but those that are named
+void TilesRun::remove_tiles_but(const std::set<std::string>& names) const
+{
+    std::vector<Path> others;
+    std::error_code ignored;
+    for (const auto& entry : fs::directory_iterator(o_.output, ignored)) {
+        const std::string name = entry.path().filename().string();
+        if (!names.contains(name) && name.starts_with("tile_") && name.ends_with(".sgrid"))
+            others.push_back(entry.path());
+    }
+    for (const Path& path : others)
+        fs::remove(path, ignored);
 }
 
 // a run that begins finds no tiles of another
 Status TilesRun::clear_output() const
 {
     SR_CHECK(make_folder(o_.output));
-    std::error_code error;
-    for (const auto& entry : fs::directory_iterator(o_.output, error)) {
-        if (!globals_.yes)
-            return fail(ErrorCode::usage, "{} is not empty; -y replaces the tiles in it", quote(o_.output));
-        const std::string name = entry.path().filename().string();
-        if (name == "index.json" || (name.starts_with("tile_") && name.ends_with(".sgrid")))
-            fs::remove(entry.path(), error);
-    }
+    std::error_code ignored;
+    if (!globals_.yes && !fs::is_empty(o_.output, ignored))
+        return fail(ErrorCode::usage, "{} is not empty; -y replaces the tiles in it", quote(o_.output));
+    fs::remove(Path(o_.output) / "index.json", ignored); // first: without it no tile is
+    remove_tiles_but({});
     return {};
 }
 
@@ -344,9 +363,6 @@ Result<bool> TilesRun::begin()
     SR_TRY(const bool finished, finished_before());
     if (finished)
         return true;
-    SR_TRY(const Json wanted, settings());
-    SR_TRY(RunFolder run, open_run(folder(), wanted, globals_.yes, {{}}));
-    run_.emplace(std::move(run));
     if (const Status opened = open(); !opened) {
         remove_run();
         return tl::make_unexpected(opened.error());
@@ -368,6 +384,10 @@ Result<Json> TilesRun::write()
     }
     SR_CHECK(world_->flush());
     SR_TRY(const TileFolder tiles, TileFolder::open(o_.output));
+    std::set<std::string> wanted; // and not what they see beside them: one that resumes need not have looked at it
+    for (const auto& [index, entry] : tiles.tiles())
+        wanted.insert(tile_name(index, entry.key));
+    remove_tiles_but(wanted);
     results["tiles"] = tiles.tiles().size();
     results["cells"] = tiles.cell_count();
     results["metres"] = length_of(track_);

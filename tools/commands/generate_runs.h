@@ -9,6 +9,7 @@
 #include "tools/commands/generation_options.h"
 #include "tools/commands/scene_input.h"
 
+#include <set>
 #include <string>
 
 namespace semrover {
@@ -106,7 +107,9 @@ class TilesRun : public GenerateRun {
     Status check() const;
     Status read();
     Result<Json> settings() const;
+    bool is_whole() const;
     Result<bool> finished_before();
+    void remove_tiles_but(const std::set<std::string>& names) const;
     Status clear_output() const;
     Status open();
     void remove_run();

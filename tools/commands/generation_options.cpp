@@ -53,7 +53,7 @@ void print_estimate(const Json& e, const Globals& globals)
     if (globals.session)
         globals.session->results = e;
     else if (globals.json)
-        fmt::print("{}\n", e.dump());
+        fmt::print("{}\n", json_text(e));
     else
         fmt::print(
             "{} voxels in {} regions, {} at a time, {} network steps each\npeak device memory {}\nabout {} on {}\n",
@@ -66,7 +66,7 @@ void print_results(const Json& results, const Globals& globals)
     if (globals.session)
         globals.session->results = results;
     else if (globals.json)
-        fmt::print("{}\n", results.dump());
+        fmt::print("{}\n", json_text(results));
     else if (!globals.quiet)
         for (const Json& output : results.value("outputs", Json::array()))
             fmt::print("{}\n", output["output"].get<std::string>());

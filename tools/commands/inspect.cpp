@@ -38,7 +38,7 @@ void append_text(std::string& out, const Report& report, size_t indent)
     for (const auto& item : report.items())
         width = std::max(width, std::min<size_t>(item.key().size(), 40));
     const auto scalar = [](const Report& value) {
-        return printable(value.is_string() ? value.get<std::string>() : value.dump(-1, ' ', true), 1000);
+        return printable(value.is_string() ? value.get<std::string>() : json_text(value, -1, true), 1000);
     };
     for (const auto& item : report.items()) {
         const Report& value = item.value();
@@ -477,7 +477,7 @@ Status inspect(const InspectArguments& o, const Globals& globals)
     SR_TRY(const Report report, describe_both(o, globals));
     std::string text;
     if (globals.json)
-        text = report.dump(-1, ' ', false, Report::error_handler_t::replace) + "\n";
+        text = json_text(report) + "\n";
     else
         append_text(text, report, 0);
     fmt::print("{}", text);

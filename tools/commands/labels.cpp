@@ -40,7 +40,7 @@ Status labels(const std::string& vox, const Globals& globals)
     for (size_t i = 0; i < kClassCount; ++i)
         list.push_back({{"number", i}, {"name", std::string(kPalette[i].name)}, {"color", hex_of(kPalette[i])}});
     if (globals.json)
-        fmt::print("{}\n", Json{{"labels", list}}.dump());
+        fmt::print("{}\n", json_text(Json{{"labels", list}}));
     else
         for (const Json& c : list)
             fmt::print("{:>3}  {:<14}{}\n", c["number"].get<size_t>(), c["name"].get<std::string>(),

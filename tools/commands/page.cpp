@@ -158,13 +158,12 @@ Status page(const PageArguments& o, const Globals& globals)
     SR_CHECK(write_file_atomically(o.output, html));
     const uint64_t points = content.scenes[0].points.count;
     if (globals.json)
-        fmt::print("{}\n", Json{{"output", o.output},
-                                {"bytes", html.size()},
-                                {"sets", content.pictures.names.size()},
-                                {"moments", content.pictures.moments.size()},
-                                {"points", points},
-                                {"cells", content.scenes[0].grid.cells.size()}}
-                               .dump());
+        fmt::print("{}\n", json_text(Json{{"output", o.output},
+                                          {"bytes", html.size()},
+                                          {"sets", content.pictures.names.size()},
+                                          {"moments", content.pictures.moments.size()},
+                                          {"points", points},
+                                          {"cells", content.scenes[0].grid.cells.size()}}));
     else if (!globals.quiet)
         fmt::print("{}: {}, {} moments of {} sets of pictures, {} points\n", quote_path(o.output),
                    bytes_text(html.size()), content.pictures.moments.size(), content.pictures.names.size(), points);

@@ -182,7 +182,7 @@ Status dry_run(Device& device, const Refinement& r, const Globals& globals)
     SR_TRY(const MemoryPlan plan, plan_refinement(device, r));
     print_plan(r, plan, globals);
     if (globals.json)
-        fmt::print("{}\n", describe(device, r, plan).dump());
+        fmt::print("{}\n", json_text(describe(device, r, plan)));
     return {};
 }
 
@@ -192,7 +192,7 @@ void print_results(const RefineArguments& o, const Globals& globals, const Json&
     if (globals.session)
         globals.session->results = results;
     else if (globals.json)
-        fmt::print("{}\n", results.dump());
+        fmt::print("{}\n", json_text(results));
     else if (!globals.quiet)
         fmt::print("peak device memory {} bytes ({}); frames are in {}\n", peak, bytes_text(peak),
                    quote_path(o.options.output / "frames"));

@@ -126,7 +126,7 @@ Status render(const RenderArguments& o, const Globals& globals)
     if (globals.session)
         globals.session->results = results;
     else if (globals.json)
-        fmt::print("{}\n", results.dump());
+        fmt::print("{}\n", json_text(results));
     return {};
 }
 

@@ -26,7 +26,7 @@ Status join(const TileArguments& o, const Globals& globals)
     SR_TRY(const VoxelGrid grid, folder.read_all());
     SR_CHECK(write_grid(o.output, grid));
     if (globals.json)
-        fmt::print("{}\n", Json{{"tiles", folder.tiles().size()}, {"cells", grid.cells.size()}}.dump());
+        fmt::print("{}\n", json_text(Json{{"tiles", folder.tiles().size()}, {"cells", grid.cells.size()}}));
     return {};
 }
 
@@ -47,7 +47,7 @@ Status cut(const TileArguments& o, const Globals& globals)
         return written;
     }
     if (globals.json)
-        fmt::print("{}\n", Json{{"tiles", cut_tiles(grid, edge).size()}, {"cells", grid.cells.size()}}.dump());
+        fmt::print("{}\n", json_text(Json{{"tiles", cut_tiles(grid, edge).size()}, {"cells", grid.cells.size()}}));
     return {};
 }
 

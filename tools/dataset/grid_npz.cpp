@@ -211,7 +211,7 @@ Status write_grid_npz(const Path& path, const VoxelGrid& grid)
 {
     SR_CHECK(check_grid(grid, quote_path(path)));
     const uint64_t v = grid.cells.size(), n = static_cast<uint64_t>(grid.points_per_voxel);
-    const std::string metadata = Json(grid.metadata).dump(-1, ' ', false, Json::error_handler_t::replace);
+    const std::string metadata = json_text(Json(grid.metadata));
     std::map<std::string, NpyArray> arrays;
     arrays["cells"] = array_of(DType::i32, {v, 3}, std::span(grid.cells));
     arrays["labels"] = array_of(DType::u8, {v}, std::span(grid.labels));

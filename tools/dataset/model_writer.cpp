@@ -88,7 +88,7 @@ TensorStream block_scales(const TensorStream& weight)
 Status write_json(const Path& path, const Json& json)
 {
     SR_CHECK(make_folder(path.parent_path()));
-    return write_file_atomically(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+    return write_file_atomically(path, json_text(json, 2) + "\n");
 }
 
 Status write_component(const Path& folder, const ComponentFiles& files, uint32_t shards)

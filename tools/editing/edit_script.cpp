@@ -4,6 +4,7 @@
 
 #include "engine/conditioning/scene_objects.h"
 #include "engine/scene/palette.h"
+#include "runtime/base/inner_path.h"
 #include "runtime/base/json_fields.h"
 #include "runtime/base/json_numbers.h"
 #include "runtime/base/quote.h"
@@ -131,10 +132,11 @@ Result<EditOperation> parse_operation(const Json& json, const Path& folder, std:
     if (!stamp.empty()) {
         // a script may come from elsewhere, and what it names is read
         const Path given = stamp, path = given.has_root_path() ? given.lexically_relative(folder) : given;
-        if (path.empty() || std::ranges::find(path, "..") != path.end())
+        o.stamp = folder / path;
+        const bool leaves = is_there(o.stamp) && !lies_inside(folder, o.stamp); // through a link
+        if (!leads_inside(path.string()) || std::ranges::find(path, "..") != path.end() || leaves)
             return fail(ErrorCode::bad_input, "{}: stamp: expected a file in the script's folder, found {}", where,
                         quote(stamp));
-        o.stamp = folder / path;
     }
     SR_TRY(o.at, point_of(json, "at", where));
     SR_TRY(o.by, point_of(json, "by", where));

@@ -246,7 +246,7 @@ Status write_undo(const Path& path, const Path& before_path, const VoxelGrid& be
                               {"points", before.has_points() ? "yes" : "no"},
                               {"points_per_voxel", fmt::format("{}", n)},
                               {"voxel_size", fmt::format("{}", before.voxel_size)},
-                              {"metadata", Json(before.metadata).dump()}});
+                              {"metadata", json_text(Json(before.metadata))}});
 }
 
 Status undo_edit(const Path& record, const Path& edited, const Path& output)

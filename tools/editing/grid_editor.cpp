@@ -17,9 +17,11 @@ namespace {
 
 using Kind = EditOperation::Kind;
 
-constexpr int32_t kGroundReach = 6; // voxels across
-constexpr int32_t kGroundStep = 2;  // voxels up or down to the nearest ground
-constexpr int32_t kOwnGround = 3;   // voxels within which a column's own ground is looked for
+constexpr int32_t kGroundReach = 6;    // voxels across
+constexpr int32_t kGroundStep = 2;     // voxels up or down to the nearest ground
+constexpr int32_t kOwnGround = 3;      // voxels within which a column's own ground is looked for
+constexpr size_t kMostAdded = 1 << 22; // voxels beside four times those that there were: copies of copies grow fast
+constexpr size_t kMostKept = 1 << 20;  // of them with points, which take 300 bytes each
 
 Cell shifted(const Cell& cell, const Cell& by)
 {
@@ -128,6 +130,16 @@ Result<std::vector<uint32_t>> GridEditor::selected(const EditOperation& o) const
     return cells;
 }
 
+// for so many voxels more, and with points
+Status GridEditor::check_room(const EditOperation& o, size_t more, size_t kept) const
+{
+    const size_t before = 4 * base_.cells.size(), most = before + (kept ? kMostKept : kMostAdded);
+    if (view_.cells.size() + more <= before + kMostAdded && (!kept || kept_.size() + kept <= most))
+        return {};
+    return fail(ErrorCode::bad_input, "{}: an edit of a grid of {} voxels may make it one of at most {}{}",
+                operation_name(o.kind), base_.cells.size(), most, kept ? " with points of stamps" : "");
+}
+
 Status GridEditor::paint(const EditOperation& o)
 {
     std::map<Cell, uint8_t> labels;
@@ -135,6 +147,7 @@ Status GridEditor::paint(const EditOperation& o)
         SR_TRY(const std::vector<Cell> places, places_in(o.where, view_.voxel_size));
         if (places.empty())
             return fail(ErrorCode::bad_input, "paint: no voxel's centre lies in the selection");
+        SR_CHECK(check_room(o, places.size(), 0));
         for (const Cell& cell : places)
             labels[cell] = o.label;
     } else {
@@ -157,6 +170,7 @@ Status GridEditor::insert(const VoxelGrid& stamp, const EditOperation& o, const 
     if (keep && stamp.points_per_voxel != points_per_voxel_)
         return fail(ErrorCode::bad_input, "{}: the stamp has {} points a voxel, the grid {}", operation_name(o.kind),
                     stamp.points_per_voxel, points_per_voxel_);
+    SR_CHECK(check_room(o, stamp.cells.size(), keep ? stamp.cells.size() : 0));
     std::map<Cell, uint8_t> labels;
     const Cell low = lowest_corner(stamp.cells), by = {at[0] - low[0], at[1] - low[1], at[2] - low[2]};
     for (size_t c = 0; c < stamp.cells.size(); ++c)

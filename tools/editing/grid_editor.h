@@ -68,6 +68,7 @@ class GridEditor {
         std::vector<uint8_t> colors;
     };
     Result<std::vector<uint32_t>> selected(const EditOperation& operation) const;
+    Status check_room(const EditOperation& operation, size_t more, size_t kept) const;
     Status paint(const EditOperation& operation);
     Status insert(const VoxelGrid& stamp, const EditOperation& operation, const Cell& at);
     Status copy(const EditOperation& operation);

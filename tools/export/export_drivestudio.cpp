@@ -171,8 +171,8 @@ class DriveStudioScene {
                                        {"class_name", waymo_type(track.label)},
                                        {"frame_annotations", std::move(places)}};
         }
-        SR_CHECK(put_file(folder_ / "instances" / "instances_info.json", info.dump(1) + "\n"));
-        return put_file(folder_ / "instances" / "frame_instances.json", frames.dump(1) + "\n");
+        SR_CHECK(put_file(folder_ / "instances" / "instances_info.json", json_text(info, 1) + "\n"));
+        return put_file(folder_ / "instances" / "frame_instances.json", json_text(frames, 1) + "\n");
     }
 
   public:

@@ -244,7 +244,7 @@ class InfiniCubeClip {
             ++report_.boxes;
         }
         const std::string attribute = stand ? "static_object_info" : "dynamic_object_info";
-        return add(attribute, fmt::format("{:06}.{}.json", moment, attribute), bytes_of(objects.dump()));
+        return add(attribute, fmt::format("{:06}.{}.json", moment, attribute), bytes_of(json_text(objects)));
     }
 
     const DriveInput& drive_;

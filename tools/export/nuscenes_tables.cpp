@@ -101,7 +101,7 @@ void NuscenesTables::add_once(const char* table, const std::string& key, const O
 Status NuscenesTables::write(const Path& folder) const
 {
     for (const auto& [table, records] : tables_)
-        SR_CHECK(put_file(folder / (table + ".json"), records.dump(0) + "\n"));
+        SR_CHECK(put_file(folder / (table + ".json"), json_text(records, 0) + "\n"));
     return {};
 }
 

@@ -165,7 +165,7 @@ void report(const EvalChamferArguments& o, const Globals& globals, const std::ve
                             {"squares", m.chamfer.squares},
                             {"points_to_surface", m.chamfer.to_surface},
                             {"surface_to_points", m.chamfer.to_points}});
-        fmt::print("{}\n", Json{{"samples", o.chamfer.samples}, {"grids", list}}.dump());
+        fmt::print("{}\n", json_text(Json{{"samples", o.chamfer.samples}, {"grids", list}}));
         return;
     }
     fmt::print("{:>6} {:>9} {:>11} {:>19} {:>19} {:>13}\n", "points", "cells", "chamfer (m)", "points to surface",

@@ -169,7 +169,7 @@ Status eval_depth(const EvalDepthArguments& o, const Globals& globals)
     report["metric"] = "depth";
     put_figures(mean.mean(), report["mean_of_frames"]);
     report["frames"] = std::move(rows);
-    fmt::print("{}\n", report.dump());
+    fmt::print("{}\n", json_text(report));
     return {};
 }
 

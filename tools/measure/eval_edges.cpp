@@ -71,7 +71,7 @@ Status eval_edges(const EvalEdgesArguments& o, const Globals& globals)
         for (size_t i = 0; i < total.labels.size(); ++i)
             if (total.labels[i].borders)
                 report["labels"][label_name(i)] = edges_json(total.labels[i]);
-        fmt::print("{}\n", report.dump());
+        fmt::print("{}\n", json_text(report));
         return {};
     }
     fmt::print("{} frames, borders of labels with an edge within so many pixels, and steps of luma\n", frames.size());

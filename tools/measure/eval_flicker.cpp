@@ -209,7 +209,7 @@ Status eval_flicker(const EvalFlickerArguments& o, const Globals& globals)
     report["metric"] = "flicker";
     report["tolerance"] = o.flow.tolerance;
     report["pairs"] = std::move(rows);
-    fmt::print("{}\n", report.dump());
+    fmt::print("{}\n", json_text(report));
     return {};
 }
 

@@ -171,7 +171,7 @@ void print_report(const FrameInputs& in, const FrameSimilarity& total, const Fra
     }
     add_parts(in, total, report);
     report["frames"] = std::move(rows);
-    fmt::print("{}\n", report.dump());
+    fmt::print("{}\n", json_text(report));
 }
 
 Status eval_frames(const EvalFramesArguments& o, const Globals& globals)

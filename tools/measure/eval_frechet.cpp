@@ -49,7 +49,7 @@ Status eval_frechet(const EvalOptions& o, std::string_view metric, EvalNetwork n
         sets.report["value"] = d.distance;
         sets.report["mean_part"] = d.mean_part;
         sets.report["covariance_part"] = d.covariance_part;
-        fmt::print("{}\n", sets.report.dump());
+        fmt::print("{}\n", json_text(sets.report));
         return {};
     }
     fmt::print("{} {:.6g}  (means {:.6g}, covariances {:.6g}; {})\n", metric, d.distance, d.mean_part,

@@ -240,7 +240,7 @@ Status eval_instances(const EvalInstancesArguments& o, const Globals& globals)
             report["labels"][label_name(i)] = counts_json(total.things.labels[i]);
     report["mistaken"] = mistaken_json(total.things);
     report["frames"] = std::move(rows);
-    fmt::print("{}\n", report.dump());
+    fmt::print("{}\n", json_text(report));
     return {};
 }
 

@@ -53,7 +53,7 @@ Status eval_kid(const EvalKidArguments& o, const Globals& globals)
         all = fmt::format(", all samples {:.6g}", whole.unbiased);
     }
     if (globals.json)
-        fmt::print("{}\n", report.dump());
+        fmt::print("{}\n", json_text(report));
     else
         fmt::print("kid {:.6g} +- {:.6g}  ({} subsets of {}{}; {})\n", d.mean, d.deviation, o.subsets, subsets.size,
                    all, sets_text(sets));

@@ -112,7 +112,7 @@ Status eval_labels(const EvalLabelsArguments& o, const Globals& globals)
     report["labels"] = labels_json(total);
     report["confusion"] = confusion_json(total);
     report["frames"] = std::move(rows);
-    fmt::print("{}\n", report.dump());
+    fmt::print("{}\n", json_text(report));
     return {};
 }
 

@@ -51,7 +51,7 @@ Status eval_mmd(const EvalMmdArguments& o, const Globals& globals)
     report["squared_unbiased"] = d.unbiased;
     report["squared_biased"] = d.biased;
     if (globals.json)
-        fmt::print("{}\n", report.dump());
+        fmt::print("{}\n", json_text(report));
     else
         fmt::print("mmd {:.6g}  (squared: {:.6g}, unbiased {:.6g}; {}; {})\n", std::sqrt(d.biased), d.biased,
                    d.unbiased, text, sets_text(sets));

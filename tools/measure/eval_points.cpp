@@ -170,7 +170,7 @@ Status eval_points(const EvalPointsArguments& o, const Globals& globals)
     report["radius"] = o.contrast.radius;
     report["strong_step"] = o.contrast.strong_step;
     report["pairs"] = std::move(rows);
-    fmt::print("{}\n", report.dump());
+    fmt::print("{}\n", json_text(report));
     return {};
 }
 

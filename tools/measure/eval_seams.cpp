@@ -35,12 +35,11 @@ Status eval_seams(const EvalSeamsArguments& o, const Globals& globals)
                     quote_path(o.grid));
     const double ratio = s.inside.mean() > 0 ? s.across.mean() / s.inside.mean() : 0;
     if (globals.json)
-        fmt::print("{}\n", Json{{"metric", "seams"},
-                                {"tile_cells", edge},
-                                {"across", steps_json(s.across)},
-                                {"inside", steps_json(s.inside)},
-                                {"ratio", ratio}}
-                               .dump());
+        fmt::print("{}\n", json_text(Json{{"metric", "seams"},
+                                          {"tile_cells", edge},
+                                          {"across", steps_json(s.across)},
+                                          {"inside", steps_json(s.inside)},
+                                          {"ratio", ratio}}));
     else
         fmt::print("across borders {:.2f} ({} pairs), inside tiles {:.2f} ({} pairs), ratio {:.3f}\n", s.across.mean(),
                    s.across.pairs, s.inside.mean(), s.inside.pairs, ratio);

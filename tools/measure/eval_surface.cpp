@@ -119,7 +119,7 @@ Status run_surface(EvalSurfaceArguments o, const Globals& globals)
     SR_TRY(const auto device, open_device(globals));
     SR_TRY(const SurfaceError error, measure_surface(*device, mesh, truth, views, o.min_views, o.radius));
     if (globals.json)
-        fmt::print("{}\n", report_of(error).dump());
+        fmt::print("{}\n", json_text(report_of(error)));
     else
         print(error, o);
     return {};

@@ -30,7 +30,7 @@ std::string text_of(const Json& value)
         return value.get<bool>() ? "yes" : "no";
     if (value.is_null())
         return "none";
-    return value.is_string() ? value.get<std::string>() : value.dump();
+    return value.is_string() ? value.get<std::string>() : json_text(value);
 }
 
 std::string size_text(double bytes)

@@ -35,7 +35,7 @@ std::string html_text(std::string_view text, size_t limit)
 std::string script_json(const Json& value)
 {
     std::string out;
-    for (const char c : value.dump(-1, ' ', true, Json::error_handler_t::replace))
+    for (const char c : json_text(value, -1, true))
         switch (c) { // only strings have them
         case '<':
             out += "\\u003c";

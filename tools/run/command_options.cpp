@@ -81,7 +81,7 @@ std::string range_text(const Json& facts)
 {
     if (!facts.contains("least"))
         return "";
-    return fmt::format(" from {} to {}", facts["least"].dump(), facts["most"].dump());
+    return fmt::format(" from {} to {}", json_text(facts["least"]), json_text(facts["most"]));
 }
 
 bool in_range(const Json& facts, const std::string& text)

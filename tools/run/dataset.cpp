@@ -57,12 +57,11 @@ Status pack(const PackArguments& o, const Globals& globals)
     options.progress = std::ref(progress);
     SR_TRY(const ShardSetInfo info, pack_shards(o.folder, o.output, options));
     if (globals.json)
-        fmt::print("{}\n", Json{{"moments", info.moments},
-                                {"pictures", info.pictures},
-                                {"shards", info.shards},
-                                {"bytes", info.bytes},
-                                {"files", info.files}}
-                               .dump());
+        fmt::print("{}\n", json_text(Json{{"moments", info.moments},
+                                          {"pictures", info.pictures},
+                                          {"shards", info.shards},
+                                          {"bytes", info.bytes},
+                                          {"files", info.files}}));
     else if (!globals.quiet)
         fmt::print("{}: {} moments, {} pictures in {} shards of {}, {} other files\n", quote_path(o.output),
                    info.moments, info.pictures, info.shards, bytes_text(info.bytes), info.files);
@@ -111,7 +110,7 @@ Status list(const std::string& folder, const Globals& globals)
     SR_TRY(const auto set, ShardSet::open(folder));
     const Json report = contents_json(set->index());
     if (globals.json) {
-        fmt::print("{}\n", report.dump());
+        fmt::print("{}\n", json_text(report));
         return {};
     }
     fmt::print("{} moments, {} pictures in {} shards of {}, {} other files\n", report["moments"].get<uint64_t>(),
@@ -142,7 +141,7 @@ Status verify_set(const std::string& folder, const Globals& globals)
             fmt::print("{}: {}\n", printable(fault.path), fault.what);
     }
     if (globals.json)
-        fmt::print("{}\n", report.dump());
+        fmt::print("{}\n", json_text(report));
     if (!faults.empty())
         return fail(ErrorCode::bad_input, "{}: {} faults, the first: {}: {}", quote_path(folder), faults.size(),
                     printable(faults[0].path), faults[0].what);
@@ -206,11 +205,10 @@ Status export_sets(const ExportArguments& o, const Globals& globals)
     SR_CHECK(out.commit());
     print_warnings(report.warnings, globals);
     if (globals.json)
-        fmt::print("{}\n", Json{{"pictures", report.pictures},
-                                {"boxes", report.boxes},
-                                {"scans", report.scans},
-                                {"left_out", report.left_out}}
-                               .dump());
+        fmt::print("{}\n", json_text(Json{{"pictures", report.pictures},
+                                          {"boxes", report.boxes},
+                                          {"scans", report.scans},
+                                          {"left_out", report.left_out}}));
     else if (!globals.quiet) {
         fmt::print("{}: {} drives, {} pictures, {} boxes as {}\n", quote_path(o.output), drives.size(), report.pictures,
                    report.boxes, o.layout);

@@ -62,7 +62,7 @@ Status write_manifest(const Path& folder, const Manifest& m)
     const Json json{{"format", kFormat},    {"version", 1},         {"task", m.task},       {"key", m.key},
                     {"attempt", m.attempt}, {"host", m.host},       {"device", m.device},   {"driver", m.driver},
                     {"begun", m.begun},     {"seconds", m.seconds}, {"adopted", m.adopted}, {"files", files}};
-    return write_file_atomically(folder / kName, json.dump(1) + "\n");
+    return write_file_atomically(folder / kName, json_text(json, 1) + "\n");
 }
 
 Result<std::vector<Manifest::File>> list_contents(const Path& folder, std::span<const char* const> skip)

@@ -79,7 +79,7 @@ Status list_tasks(const JobFile& job, const std::vector<Task>& tasks, const Glob
 {
     for (const Task& task : tasks)
         if (globals.json)
-            fmt::print("{}\n", task_json(job, task).dump());
+            fmt::print("{}\n", json_text(task_json(job, task)));
         else
             fmt::print("{}\n", task.name());
     return {};
@@ -111,7 +111,8 @@ Status show_status(const JobFile& job, const std::vector<Task>& tasks, const Glo
         const TaskState state = state_of(job, task, key, begun);
         ++counts[state.state];
         if (globals.json)
-            fmt::print("{}\n", Json{{"task", task.name()}, {"state", state.state}, {"detail", state.detail}}.dump());
+            fmt::print("{}\n",
+                       json_text(Json{{"task", task.name()}, {"state", state.state}, {"detail", state.detail}}));
         else if (state.state != "done" || globals.verbose)
             fmt::print("{}: {}{}{}\n", task.name(), state.state, state.detail.empty() ? "" : ", ", state.detail);
     }
@@ -203,7 +204,7 @@ Status dry_run(const JobFile& job, std::vector<Task> tasks, const Globals& globa
     SR_TRY(Json e, estimate(job, tasks, globals));
     e["done"] = done;
     if (globals.json) {
-        fmt::print("{}\n", e.dump());
+        fmt::print("{}\n", json_text(e));
         return {};
     }
     fmt::print("{} scenes to generate, {} drives of {} frames to draw{}; {} tasks are done\n",
@@ -228,7 +229,8 @@ bool ends_the_part(ErrorCode code)
 void say(const Globals& globals, const Task& task, size_t number, size_t count, std::string_view what)
 {
     if (globals.log_json)
-        print_stderr("{}\n", Json{{"task", task.name()}, {"number", number}, {"of", count}, {"state", what}}.dump());
+        print_stderr("{}\n",
+                     json_text(Json{{"task", task.name()}, {"number", number}, {"of", count}, {"state", what}}));
     else if (!globals.quiet)
         print_stderr("semrover: {}/{} {}: {}\n", number, count, task.name(), what);
 }
@@ -281,7 +283,7 @@ Status run_all(const JobFile& job, const std::vector<Task>& tasks, const RunArgu
                        {"by_others", tally->by_others}, {"failed", tally->failed}, {"waiting", tally->waiting},
                        {"output", job.out.string()}};
     if (globals.json)
-        fmt::print("{}\n", results.dump());
+        fmt::print("{}\n", json_text(results));
     else if (!globals.quiet)
         fmt::print("{} tasks: {} done, {} were done, {} failed, {} wait for others; {}\n", tasks.size(),
                    tally->done + tally->by_others, tally->were_done, tally->failed, tally->waiting,

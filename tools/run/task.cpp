@@ -184,7 +184,7 @@ Result<std::string> TaskKeys::key(const Task& task)
     SR_TRY(Json json, task.drive ? drive_json(task) : scene_json(*task.scene));
     json["version"] = kVersion;
     Hash hash;
-    hash.add(json.dump());
+    hash.add(json_text(json));
     return hash_text(hash.value());
 }
 

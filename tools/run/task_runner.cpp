@@ -67,7 +67,7 @@ Status forget_missing_pictures(const Path& folder)
             const bool names_file = member.key().ends_with("_path") && member->is_string();
             member = names_file && !is_file(folder / member->get<std::string>()) ? frame.erase(member) : ++member;
         }
-    return write_file_atomically(path, json.dump(1) + "\n");
+    return write_file_atomically(path, json_text(json, 1) + "\n");
 }
 
 // kinds of pictures that the job does not ask for
@@ -308,7 +308,7 @@ void keep_failure(const Path& out, const Task& task, const Error& error)
                     {"message", error.message},
                     {"host", host_name()},
                     {"time", utc_now()}};
-    (void)write_file_atomically(file, json.dump(1) + "\n"); // the exit code says it, too
+    (void)write_file_atomically(file, json_text(json, 1) + "\n"); // the exit code says it, too
 }
 
 std::optional<TaskFailure> failure_of(const Path& out, const Task& task)

@@ -190,7 +190,7 @@ Status write_outputs(const FuseArguments& o, const FusedMesh& fused, const Grids
     SR_CHECK(o.mesh_format == "ply" ? write_mesh_ply(out.mesh, fused.mesh) : write_glb(out.mesh, fused.mesh));
     SR_CHECK(write_grid(out.semantic, grids.semantic));
     SR_CHECK(write_grid(out.voxfield, grids.voxfield));
-    SR_CHECK(write_file_atomically(out.run, run.dump(1) + "\n"));
+    SR_CHECK(write_file_atomically(out.run, json_text(run, 1) + "\n"));
     return folder.commit();
 }
 
@@ -226,7 +226,7 @@ Status run_fuse(FuseArguments o, const Globals& globals)
     if (!globals.quiet)
         print_warnings(folder, fused);
     if (globals.json)
-        fmt::print("{}\n", figures.dump());
+        fmt::print("{}\n", json_text(figures));
     else
         fmt::print("{} frames: {} faces, {} voxels in {}\n", folder.count(), fused.mesh.faces.size(),
                    grids.semantic.cells.size(), quote_path(o.output));

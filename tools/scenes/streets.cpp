@@ -256,7 +256,7 @@ Status streets(const StreetsArguments& o, const Globals& globals)
         SR_CHECK(write_actors(out / "actors.json", actors));
         about["actors"] = actors.size();
     }
-    SR_CHECK(write_file_atomically(out / "street.json", about.dump(2) + "\n"));
+    SR_CHECK(write_file_atomically(out / "street.json", json_text(about, 2) + "\n"));
     if (o.pictures || !o.no_grids) {
         SR_TRY(const auto device, open_device(globals));
         SR_CHECK(draw(o, globals, *device, street, actors, path, shifted, out));
@@ -264,7 +264,7 @@ Status streets(const StreetsArguments& o, const Globals& globals)
     SR_CHECK(write_objects(out / "objects.json", street.boxes));
     SR_CHECK(out.commit());
     if (globals.json)
-        fmt::print("{}\n", about.dump());
+        fmt::print("{}\n", json_text(about));
     else if (!globals.quiet)
         fmt::print("{} m of street, {} faces, {} frames\n", o.street.length, street.mesh.faces.size(),
                    path.frames.size());

@@ -134,12 +134,11 @@ void report(const VoxelizeArguments& o, const Globals& globals, const VoxelizedM
         for (size_t i = 0; i < kClassCount; ++i)
             if (counts[i])
                 labels[std::string(kPalette[i].name)] = counts[i];
-        fmt::print("{}\n", Json{{"cells", v.grid.cells.size()},
-                                {"points", v.grid.cells.size() * size_t(v.grid.points_per_voxel)},
-                                {"faces", mesh.faces.size()},
-                                {"area", area},
-                                {"labels", labels}}
-                               .dump());
+        fmt::print("{}\n", json_text(Json{{"cells", v.grid.cells.size()},
+                                          {"points", v.grid.cells.size() * size_t(v.grid.points_per_voxel)},
+                                          {"faces", mesh.faces.size()},
+                                          {"area", area},
+                                          {"labels", labels}}));
     } else if (!globals.quiet) {
         fmt::print("{}: {} voxels of {} m, {} points each, {:.6g} m^2 of {} faces\n", printable(o.output),
                    v.grid.cells.size(), v.grid.voxel_size, v.grid.points_per_voxel, area, mesh.faces.size());

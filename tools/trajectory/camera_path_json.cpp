@@ -165,7 +165,7 @@ Status write_camera_path_json(const Path& path, const CameraPath& cameras)
         entry["render_time"] = frame.time;
         file["camera_path"].push_back(std::move(entry));
     }
-    return write_file_atomically(path, file.dump(1) + "\n");
+    return write_file_atomically(path, json_text(file, 1) + "\n");
 }
 
 } // namespace semrover

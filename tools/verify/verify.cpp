@@ -161,13 +161,13 @@ Status verify(const VerifyArguments& o, const Globals& globals)
             print_line(r);
     }
     if (globals.json)
-        fmt::print("{}\n", nlohmann::ordered_json{{"device", device->name()},
-                                                  {"precision", o.precision},
-                                                  {"passed", counts[0]},
-                                                  {"failed", counts[1]},
-                                                  {"skipped", counts[2]},
-                                                  {"cases", list}}
-                               .dump(-1, ' ', true));
+        fmt::print("{}\n", json_text(nlohmann::ordered_json{{"device", device->name()},
+                                                            {"precision", o.precision},
+                                                            {"passed", counts[0]},
+                                                            {"failed", counts[1]},
+                                                            {"skipped", counts[2]},
+                                                            {"cases", list}},
+                                     -1, true));
     else if (cases.size() > 1)
         fmt::print("{} passed, {} failed, {} skipped\n", counts[0], counts[1], counts[2]);
     if (counts[1])

@@ -67,7 +67,7 @@ std::string Recorder::transforms(uint32_t width, uint32_t height) const
         frame["transform_matrix"].push_back({0, 0, 0, 1});
         file["frames"].push_back(std::move(frame));
     }
-    return file.dump(1) + "\n";
+    return json_text(file, 1) + "\n";
 }
 
 Status Recorder::save(const Path& path, uint32_t width, uint32_t height) const

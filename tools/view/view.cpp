@@ -138,7 +138,7 @@ Status run_view(const ViewArguments& o, const Globals& globals)
     SR_TRY(const auto viewer, view::Viewer::open(request));
     SR_CHECK(viewer->run(script));
     if (globals.json) {
-        fmt::print("{}\n", results_of(*viewer).dump());
+        fmt::print("{}\n", json_text(results_of(*viewer)));
         return {};
     }
     const view::Figures& f = viewer->figures();
