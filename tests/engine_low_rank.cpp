@@ -190,6 +190,16 @@ TEST(engine_low_rank, what_fits_no_weight_is_refused_by_name)
     Tensors broken = pair("proj_in", shape[1], shape[0]);
     broken.all.at("proj_in.lora_A.weight").second[0] = INFINITY;
     EXPECT_TRUE(says(load(broken), "proj_in.lora_A.weight"));
+    // sums that no type holds: infinite, and of infinities of both signs
+    for (const char* layer : {"proj_in", "norm_out.linear", "semantic_embed", "transformer_blocks.0.attn.to_q"})
+        for (const float second : {1e30f, -1e30f}) {
+            const std::vector<uint64_t> matrix = weights().all.at(std::string(layer) + ".weight").first;
+            Tensors huge = pair(layer, matrix[1], matrix[0]);
+            std::ranges::fill(huge.all.at(std::string(layer) + ".lora_A.weight").second, 1e30f);
+            std::ranges::fill(huge.all.at(std::string(layer) + ".lora_B.weight").second, 1e30f);
+            huge.all.at(std::string(layer) + ".lora_B.weight").second[1] = second;
+            EXPECT_TRUE(says(load(huge), layer)) << second;
+        }
 }
 
 } // namespace engine_low_rank_test
