@@ -3,6 +3,7 @@
 #include "engine/job/outputs.h"
 
 #include "engine/annotation/drive_record.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
 
@@ -10,8 +11,7 @@ namespace semrover {
 
 Status check_writable(const Path& path, bool replace)
 {
-    if (std::filesystem::exists(path) && !replace)
-        return fail(ErrorCode::usage, "{} exists; `replace` replaces it", quote_path(path));
+    SR_CHECK(refuse_existing(path, replace));
     return AtomicFile::create(path).map([](const AtomicFile&) {});
 }
 

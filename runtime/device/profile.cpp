@@ -2,10 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/device/profile.h"
 
+#include "runtime/base/file.h"
+
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -45,11 +44,8 @@ Status Profile::write(const std::string& path) const
                          {"ts", e.begin_us},
                          {"dur", e.duration_us},
                          {"args", {{"groups", e.groups}, {"gflop", e.flops / 1e9}, {"tile", e.tile}}}});
-    std::ofstream out(path);
-    out << nlohmann::json{{"traceEvents", std::move(trace)}, {"displayTimeUnit", "ms"}}.dump();
-    if (!out.flush())
-        return fail(ErrorCode::bad_input, "cannot write the profile '{}': {}", path, std::strerror(errno));
-    return {};
+    return write_file_atomically(path,
+                                 nlohmann::json{{"traceEvents", std::move(trace)}, {"displayTimeUnit", "ms"}}.dump());
 }
 
 std::vector<Profile::Total> Profile::totals() const

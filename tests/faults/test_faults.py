@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: semrover authors
+# SPDX-License-Identifier: Apache-2.0
+"""The Nth call of each kind fails, for every command that writes: an error is one line that says which file and why,
+nothing is half-written, nothing is left, and the same command goes on to the bytes of an undisturbed run.
+
+FAULTS=K tries K of each kind and command, evenly spread, FAULTS=all every one; COMMANDS=a,b only these."""
+import collections
+import errno
+import os
+import pathlib
+import tempfile
+import unittest
+
+from small_work import COMMANDS, GOES_ON, SmallWork, essence
+
+LIBRARY = os.environ["FAULTY_FILES"]
+MOST = os.environ.get("FAULTS", "1")
+ONLY = os.environ.get("COMMANDS", "").split(",")
+
+# a kind's errors; 0: it says that it was done and was not, -1: half of it is
+ERRORS = {
+    "create": (errno.EACCES, errno.EMFILE), "open": (errno.EIO, errno.EMFILE), "list": (errno.EIO,),
+    "entry": (errno.EIO,), "stat": (errno.EACCES,), "read": (errno.EIO, -1), "write": (errno.ENOSPC, errno.EIO, -1),
+    "flush": (errno.EIO,), "close": (errno.EIO,), "map": (errno.ENOMEM,), "lock": (errno.ENOLCK,),
+    "rename": (errno.EACCES,), "move": (errno.EACCES,), "mkdir": (errno.ENOSPC,), "link": (errno.EMLINK,),
+    "unlink": (errno.EACCES,), "cut": (errno.EIO,),
+}
+CODES = (3, 5, 7)  # bad input, memory; of `run`: a task failed
+# in CI those that a device takes no time for
+QUICK = ("generate", "generate_along", "render", "edit", "run", "video", "voxelize", "edit_labels", "edit_undo", "tile", "page",
+         "pack", "unpack", "export_kitti", "export_nuscenes", "convert_model", "convert_scene", "convert_path", "labels")
+
+
+def spread(count, most):
+    """-> numbers of 1 to count, evenly"""
+    if most == "all" or int(most) >= count:
+        return range(1, count + 1)
+    most = int(most)
+    return sorted({1 + (2 * i + 1) * count // (2 * most) for i in range(most)})
+
+
+class Faults(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory(prefix="semrover-faults-")
+        cls.addClassCleanup(folder.cleanup)
+        cls.work = SmallWork(folder.name)
+        cls.log = pathlib.Path(folder.name + ".log")
+        cls.addClassCleanup(lambda: cls.log.unlink(missing_ok=True))
+        cls.table = []
+
+    @classmethod
+    def tearDownClass(cls):
+        print("\ncommand | calls | faults | ended with a line | went on to the same bytes | harmless")
+        for row in cls.table:
+            print(" | ".join(str(cell) for cell in row))
+
+    def calls(self, line, name, **fault):
+        """-> what is said of each call, and the process"""
+        self.log.unlink(missing_ok=True)
+        done = self.work.run(line, name=name, LD_PRELOAD=LIBRARY, FAULT_LOG=str(self.log), **fault)
+        return (self.log.read_text().splitlines() if self.log.exists() else []), done
+
+    def test_every_command(self):
+        for name, line in COMMANDS.items():
+            if name in ONLY if ONLY[0] else name in QUICK or MOST != "1":
+                self.command(name, line)
+
+    def command(self, name, line):
+        self.work.clear()
+        log, done = self.calls(line, name)
+        self.assertEqual(done.returncode, 0, f"{name}: {done.stderr}")
+        self.whole = self.work.results()
+        self.went_on = {}  # {what lay there after a fault: what became of it}
+        counts = collections.Counter(entry.split(" ", 1)[0] for entry in log)
+        happened = collections.Counter()
+        for kind, count in sorted(counts.items()):
+            for call in spread(count, MOST):
+                for error in ERRORS[kind] if MOST != "1" else ERRORS[kind][:1]:
+                    with self.subTest(command=name, fault=f"{kind}:{call}:{error}"):
+                        happened[self.told(self.fault, name, line, kind, call, error)] += 1
+        total = sum(happened.values())
+        self.table.append((name, ", ".join(f"{k} {n}" for k, n in sorted(counts.items())), total, happened["line"],
+                           happened["line"], happened["harmless"]))
+        print(self.table[-1], flush=True)
+
+    def told(self, check, *words):
+        """a failure is said at once: hours may follow"""
+        try:
+            return check(*words)
+        except AssertionError as failure:
+            print(*words, str(failure).replace("\n", " "), flush=True)
+            raise
+
+    def fault(self, name, line, kind, call, error):
+        self.work.clear()
+        # a full disk stays full
+        which = f"{kind}:{call}{'+' if error == errno.ENOSPC and kind == 'write' else ''}:{error}"
+        log, done = self.calls(line, name, FAULT=which)
+        struck = [entry.split(" ", 2)[2] for entry in log if entry.startswith("FAULT ")]
+        if not struck:
+            return "not met"  # threads take turns in another order
+        if kind != "unlink":
+            self.assertEqual(self.work.temporaries(), [], f"left after {struck[0]}: {done.stderr}")
+        if done.returncode == 0:
+            self.assertEqual(self.differences(), {}, f"exit code 0 after {struck[0]}")
+            return "harmless"
+        self.expect_line(done, error, struck[0])
+        self.expect_nothing_half_written(struck[0])
+        self.expect_to_go_on(name, line, f"{which} of {struck[0]}: {done.stderr}")
+        return "line"
+
+    def expect_line(self, done, error, path):
+        lines = [text for text in done.stderr.splitlines() if not text.startswith("semrover: warning: ")]
+        self.assertEqual(len(lines), 1, f"{done.returncode} {done.stderr} after {path}")
+        self.assertIn(done.returncode, CODES, lines[0])
+        self.assertTrue(lines[0].startswith("semrover: error: "), lines[0])
+        if error > 0 and done.returncode != 7:  # 7: the lines are those of --status
+            self.assertIn(os.strerror(error), lines[0], f"after {path}")
+            self.assertIn("'", lines[0])
+
+    def expect_nothing_half_written(self, path):
+        for file in self.work.files():
+            name = str(file.relative_to(self.work.out))
+            if name in self.whole and file.name != "run.json":
+                self.assertEqual(essence(file), self.whole[name], f"{name} after {path}")
+
+    def differences(self):
+        now = self.work.results()
+        return {name: (self.whole.get(name), now.get(name)) for name in {**self.whole, **now}
+                if self.whole.get(name) != now.get(name)}
+
+    def expect_to_go_on(self, name, line, after):
+        state = self.work.snapshot()
+        if state not in self.went_on:
+            again = self.work.run(line, name=name)
+            if again.returncode == 2 and name not in GOES_ON and "-y replaces" in again.stderr:
+                again = self.work.run(line, ["-y"], name=name)
+            self.went_on[state] = again.returncode, again.stderr, self.differences() if not again.returncode else {}
+        self.assertEqual(self.went_on[state], (0, self.went_on[state][1], {}), after)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
