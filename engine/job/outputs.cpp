@@ -36,6 +36,13 @@ std::optional<Json> finished_results(const Path& folder, const Json& settings, c
     return results;
 }
 
+bool goes_on(const Path& folder, const Json& settings)
+{
+    const auto run = read_json(folder / "run.json");
+    return run && run->is_object() && run->value("settings", Json()) == settings &&
+           run->value("state", Json()) == "running";
+}
+
 Status write_record_of(const CameraPath& path, double depth_unit, const Path& folder, const JobCallbacks& callbacks)
 {
     const auto record = drive_record_of(path, depth_unit);
@@ -50,12 +57,7 @@ Status write_record_of(const CameraPath& path, double depth_unit, const Path& fo
 Result<RunFolder> open_run(const Path& folder, const Json& settings, bool replace, const RunContents& contents,
                            bool keep_finished)
 {
-    bool restart = false;
-    if (replace) {
-        const auto before = read_json(folder / "run.json");
-        restart = !(before && before->is_object() && before->value("settings", Json()) == settings &&
-                    before->value("state", Json()) == "running");
-    }
+    const bool restart = replace && !goes_on(folder, settings);
     return RunFolder::open(folder, settings, restart, contents, keep_finished);
 }
 

@@ -97,6 +97,7 @@ COMMANDS = {**GOES_ON, **BEGINS_AGAIN}
 OF_SCENES = ("voxelize", "fuse", "streets")
 
 STATE = ("lock", "journal.jsonl")
+PIECES = (".run/regions/", ".run/tiles/", "/encoded/", "/.work/")  # what stays of them only costs space
 PASSING = ("seconds", "bytes", "computed", "resumed", "adopted")  # of results: what depends on when and how often
 
 
@@ -171,7 +172,7 @@ class SmallWork:
         for path in self.files():
             name = str(path.relative_to(self.out))
             if path.name not in STATE and not path.name.startswith(".") and not name.startswith("cache/") and \
-                    "/.work/" not in name:
+                    not any(piece in name for piece in PIECES):
                 found[name] = essence(path)
         return found
 
