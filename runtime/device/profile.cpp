@@ -72,8 +72,8 @@ std::string Profile::summary() const
         all += total.duration_us;
     std::string out;
     for (const Total& total : sorted)
-        out += fmt::format("{:10.1f} ms {:5.1f} % {:6} x {}\n", total.duration_us / 1e3,
-                           100 * total.duration_us / all, total.count, total.name);
+        out += fmt::format("{:10.1f} ms {:5.1f} % {:6} x {}\n", total.duration_us / 1e3, 100 * total.duration_us / all,
+                           total.count, total.name);
     return out;
 }
 

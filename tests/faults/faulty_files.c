@@ -4,8 +4,8 @@
 // it is to do below FAULT_FOLDER, which has to be an absolute path:
 //   FAULT_HIDE=FOLDER:SECONDS  what is in the folder is not found, until it is that old there (cached absence)
 //   FAULT=KIND:N:ERRNO         the Nth call of a kind fails; N+: all from then on. ERRNO 0: it does nothing, and says
-//                              that it did; -1: a write takes half of its bytes. With :after behind it the call happens,
-//                              and then fails (a lost answer). Several, with commas between them
+//                              that it did; -1: a write takes half of its bytes. With :after behind it the call
+//                              happens, and then fails (a lost answer). Several, with commas between them
 //   FAULT_LOG=FILE             gets a line a call, KIND PATH, of a fault FAULT KIND PATH
 //   FAULT_RECORD=FILE          gets all that changes the disk, in order, for power_cuts.py
 // Kinds: create (opened for writing), open, list, entry (of a listing), stat, read, write, flush, close, map, lock,
@@ -34,9 +34,29 @@
 
 enum { kLongest = 4096 };
 
-enum Kind { CREATE, OPEN, LIST, ENTRY, STAT, READ, WRITE, FLUSH, CLOSE, MAP, LOCK, RENAME, MOVE, MKDIR, LINK, UNLINK, CUT, KINDS };
-static const char* const kNames[KINDS] = {"create", "open", "list", "entry", "stat", "read", "write", "flush", "close",
-                                          "map", "lock", "rename", "move", "mkdir", "link", "unlink", "cut"};
+enum Kind {
+    CREATE,
+    OPEN,
+    LIST,
+    ENTRY,
+    STAT,
+    READ,
+    WRITE,
+    FLUSH,
+    CLOSE,
+    MAP,
+    LOCK,
+    RENAME,
+    MOVE,
+    MKDIR,
+    LINK,
+    UNLINK,
+    CUT,
+    KINDS
+};
+static const char* const kNames[KINDS] = {"create", "open",  "list",  "entry",  "stat", "read",
+                                          "write",  "flush", "close", "map",    "lock", "rename",
+                                          "move",   "mkdir", "link",  "unlink", "cut"};
 
 // ---- paths
 
@@ -98,7 +118,8 @@ static int is_hidden(const char* path)
 static void append_to(const char* variable, const struct iovec* parts, int count)
 {
     const char* file = getenv(variable);
-    const int fd = file ? (int)syscall(SYS_openat, AT_FDCWD, file, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666) : -1;
+    const int fd =
+        file ? (int)syscall(SYS_openat, AT_FDCWD, file, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666) : -1;
     if (fd >= 0) {
         (void)!syscall(SYS_writev, fd, parts, count); // at once: threads and processes do not mix
         syscall(SYS_close, fd);
@@ -164,7 +185,8 @@ static void record(const char* kind, const char* path, const char* other, long n
     struct stat status = {0};
     syscall(SYS_newfstatat, AT_FDCWD, path, &status, AT_SYMLINK_NOFOLLOW);
     char line[2 * kLongest + 128];
-    const int n = snprintf(line, sizeof line, "%s\t%lu\t%s\t%s\t%ld\t%zu\n", kind, status.st_ino, path, other, number, size);
+    const int n =
+        snprintf(line, sizeof line, "%s\t%lu\t%s\t%s\t%ld\t%zu\n", kind, status.st_ino, path, other, number, size);
     const struct iovec parts[2] = {{line, (size_t)n}, {(void*)bytes, size}};
     append_to("FAULT_RECORD", parts, 2);
     errno = before;

@@ -94,6 +94,8 @@ BEGINS_AGAIN = {
     "video": f"render in/points.sgrid {SIZE} --video out/drive.mp4 -o out/drawn",
 }
 COMMANDS = {**GOES_ON, **BEGINS_AGAIN}
+# that want -y where they ended after a file of theirs had its name
+MAY_WANT_YES = {*BEGINS_AGAIN, "generate", "generate_cold", "generate_tiles"}
 OF_SCENES = ("voxelize", "fuse", "streets")
 
 STATE = ("lock", "journal.jsonl")
@@ -171,7 +173,8 @@ class SmallWork:
         found = {}
         for path in self.files():
             name = str(path.relative_to(self.out))
-            if path.name not in STATE and not path.name.startswith(".") and not name.startswith("cache/") and \
+            if path.name not in STATE and not name.startswith("cache/") and ".semrover-" not in name and \
+                    not name.endswith((".passing", ".making")) and \
                     not any(piece in name for piece in PIECES):
                 found[name] = essence(path)
         return found
@@ -189,6 +192,10 @@ class SmallWork:
     def temporaries(self):
         return [str(p.relative_to(self.out)) for p in self.out.rglob("*")
                 if p.name.startswith(".semrover-") or p.name.endswith((".passing", ".making"))]
+
+
+def differences(whole, now):
+    return {name: (whole.get(name), now.get(name)) for name in {**whole, **now} if whole.get(name) != now.get(name)}
 
 
 def digest(path):

@@ -253,8 +253,7 @@ Status regenerate(const Regeneration& what, const RegenerationArguments& o, cons
         fmt::print("nothing to generate\n");
         return {};
     }
-    SR_TRY(const Json results, generates ? generate_targets(what, o, globals)
-                                           : leave_without_points(what, o, globals));
+    SR_TRY(const Json results, generates ? generate_targets(what, o, globals) : leave_without_points(what, o, globals));
     if (o.generation.dry_run)
         print_estimate(results, globals);
     else
