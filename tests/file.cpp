@@ -3,6 +3,7 @@
 // needs: posix
 #include "runtime/base/file.h"
 
+#include "runtime/base/final_name.h"
 #include "runtime/base/quote.h"
 #include "runtime/system/host_name.h"
 #include "tests/support/says.h"
@@ -70,6 +71,19 @@ TEST(File, a_file_without_permission_is_refused)
     const ScratchFolder folder;
     chmod(folder.put("secret", "x").c_str(), 0);
     EXPECT_TRUE(says(read_file(folder / "secret", 10), "Permission denied"));
+}
+
+TEST(File, what_cannot_be_examined_counts_as_there)
+{
+    const ScratchFolder folder;
+    std::filesystem::create_symlink("loop", folder / "loop");
+    EXPECT_TRUE(is_there(folder / "loop") && is_file(folder / "loop") && is_folder(folder / "loop"));
+    EXPECT_FALSE(is_there(folder / "absent") || is_file(folder / std::string(300, 'x')));
+    const Status refused = refuse_existing(folder / "loop", false);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::bad_input);
+    EXPECT_NE(refused.error().message.find("cannot examine"), std::string::npos) << refused.error().message;
+    EXPECT_TRUE(refuse_existing(folder / "absent", false) && refuse_existing(folder / "loop", true));
 }
 
 TEST(AtomicFile, an_existing_file_is_replaced_whole)

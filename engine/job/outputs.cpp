@@ -3,6 +3,7 @@
 #include "engine/job/outputs.h"
 
 #include "engine/annotation/drive_record.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
 
@@ -10,8 +11,7 @@ namespace semrover {
 
 Status check_writable(const Path& path, bool replace)
 {
-    if (std::filesystem::exists(path) && !replace)
-        return fail(ErrorCode::usage, "{} exists; `replace` replaces it", quote_path(path));
+    SR_CHECK(refuse_existing(path, replace));
     return AtomicFile::create(path).map([](const AtomicFile&) {});
 }
 
@@ -36,6 +36,13 @@ std::optional<Json> finished_results(const Path& folder, const Json& settings, c
     return results;
 }
 
+bool goes_on(const Path& folder, const Json& settings)
+{
+    const auto run = read_json(folder / "run.json");
+    return run && run->is_object() && run->value("settings", Json()) == settings &&
+           run->value("state", Json()) == "running";
+}
+
 Status write_record_of(const CameraPath& path, double depth_unit, const Path& folder, const JobCallbacks& callbacks)
 {
     const auto record = drive_record_of(path, depth_unit);
@@ -50,12 +57,7 @@ Status write_record_of(const CameraPath& path, double depth_unit, const Path& fo
 Result<RunFolder> open_run(const Path& folder, const Json& settings, bool replace, const RunContents& contents,
                            bool keep_finished)
 {
-    bool restart = false;
-    if (replace) {
-        const auto before = read_json(folder / "run.json");
-        restart = !(before && before->is_object() && before->value("settings", Json()) == settings &&
-                    before->value("state", Json()) == "running");
-    }
+    const bool restart = replace && !goes_on(folder, settings);
     return RunFolder::open(folder, settings, restart, contents, keep_finished);
 }
 

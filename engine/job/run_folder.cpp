@@ -125,7 +125,7 @@ Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool
     SR_CHECK(make_folder(folder));
     SR_CHECK(run.refuse_links());
     SR_CHECK(run.lock());
-    if (fs::exists(folder / "run.json") && !restart) {
+    if (is_there(folder / "run.json") && !restart) {
         SR_TRY(const Json before, read_summary(folder / "run.json"));
         const bool finished = before.value("state", Json()) == "finished";
         if (before.value("settings", Json()) != settings)
@@ -139,6 +139,8 @@ Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool
     for (const std::string& name : run.names())
         remove_temporary_files(folder / name);
     SR_TRY(run.journal_, open_own(folder / "journal.jsonl", system::FileUse::append));
+    if (const int error = system::flush_folder(folder)) // the journal's name
+        return system_failure("flush", folder, error);
     return run;
 }
 
@@ -199,7 +201,7 @@ Status RunFolder::start()
 Status RunFolder::read_journal()
 {
     const Path path = path_ / "journal.jsonl";
-    if (!fs::exists(path))
+    if (!is_there(path))
         return {};
     SR_TRY(const std::string text, read_text_file(path, kMaxJournalBytes));
     size_t at = 0;

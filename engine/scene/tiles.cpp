@@ -111,8 +111,7 @@ std::string tile_name(const TileIndex& tile, std::string_view key)
 
 bool TileFolder::is_one(const Path& path)
 {
-    std::error_code ignored;
-    return fs::is_directory(path, ignored) && fs::exists(path / "index.json", ignored);
+    return is_folder(path) && is_there(path / "index.json");
 }
 
 Result<TileFolder> TileFolder::open(const Path& folder)
@@ -141,9 +140,8 @@ Result<TileFolder> TileFolder::open(const Path& folder)
     SR_TRY(const Json* tiles, member(index, "tiles", where));
     SR_TRY(f.tiles_, parse_tiles(*tiles, f.tile_cells_, where));
     for (const auto& [tile, entry] : f.tiles_) {
-        std::error_code ignored;
         const std::string name = tile_name(tile, entry.key);
-        if (!fs::is_regular_file(folder / name, ignored))
+        if (!is_file(folder / name))
             return fail(ErrorCode::bad_input, "{} names {}, which is not there", where, quote(name));
     }
     return f;

@@ -45,8 +45,7 @@ Result<RegionResult> read_region(const Path& path, uint32_t region)
 Status save_region(RunFolder& run, const RegionResult& r)
 {
     const Path path = region_path(run, r.region);
-    std::error_code error;
-    std::filesystem::create_directories(path.parent_path(), error);
+    SR_CHECK(make_folder(path.parent_path()));
     const TensorData tensors[] = {
         {"targets", DType::u32, {r.targets.size()}, std::as_bytes(std::span(r.targets))},
         {"points", DType::f16, {r.points.size()}, std::as_bytes(std::span(r.points))},

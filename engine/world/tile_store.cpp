@@ -36,8 +36,7 @@ std::optional<VoxelGrid> TileStore::read(const TileIndex& tile, uint64_t key)
         waiting_.clear();
     }
     const std::string name = tile_name(tile, hash_text(key));
-    std::error_code ignored;
-    if (!std::filesystem::exists(folder_ / name, ignored))
+    if (!is_there(folder_ / name))
         return std::nullopt;
     auto cells = read_grid(folder_ / name);
     if (!cells)

@@ -19,6 +19,21 @@ namespace {
 constexpr size_t kMostListed = size_t(1) << 22; // of one folder
 constexpr size_t kPieceBytes = size_t(1) << 18; // stay in a cache
 
+using FileType = std::filesystem::file_type;
+
+// none: it cannot be examined. A name that is too long for any file is not found
+FileType type_of(const Path& path, std::error_code& error)
+{
+    const FileType type = std::filesystem::status(path, error).type();
+    return error == std::errc::filename_too_long ? FileType::not_found : type;
+}
+
+FileType type_of(const Path& path)
+{
+    std::error_code ignored;
+    return type_of(path, ignored);
+}
+
 struct OpenFile {
     system::File file;
     uint64_t size;
@@ -105,6 +120,14 @@ tl::unexpected<Error> cannot_write(const Path& path, int error)
     return fail(ErrorCode::bad_input, "cannot write {}: {}", quote_path(path), system::message_of(error));
 }
 
+// names that are new or changed in a folder survive a power cut
+Status flush_names(const Path& folder)
+{
+    if (const int error = system::flush_folder(folder))
+        return fail(ErrorCode::bad_input, "cannot flush folder {}: {}", quote_path(folder), system::message_of(error));
+    return {};
+}
+
 // Paths in a folder that pass the test, sorted: what an iterator finds on the disk, and what `part` makes of the names
 // in memory below it (empty: nothing)
 template <typename Iterator, typename Part, typename Test>
@@ -138,24 +161,23 @@ Result<std::vector<Path>> list(const Path& folder, Part part, Test test)
 
 bool is_there(const Path& path)
 {
-    std::error_code ignored;
-    return find_in_memory(path) || std::filesystem::exists(path, ignored);
+    return find_in_memory(path) || type_of(path) != FileType::not_found;
 }
 
 bool is_file(const Path& path)
 {
-    std::error_code ignored;
     if (const auto entry = find_in_memory(path))
         return !entry->folder;
-    return std::filesystem::is_regular_file(path, ignored);
+    const FileType type = type_of(path);
+    return type == FileType::regular || type == FileType::none;
 }
 
 bool is_folder(const Path& path)
 {
-    std::error_code ignored;
     if (const auto entry = find_in_memory(path))
         return entry->folder;
-    return std::filesystem::is_directory(path, ignored);
+    const FileType type = type_of(path);
+    return type == FileType::directory || type == FileType::none;
 }
 
 Result<std::vector<Path>> list_files(const Path& folder)
@@ -180,10 +202,15 @@ Result<std::vector<Path>> list_tree(const Path& folder)
 
 Status make_folder(const Path& path)
 {
+    std::vector<Path> made;
+    for (Path above = path; !above.empty() && type_of(above) == FileType::not_found; above = above.parent_path())
+        made.push_back(above);
     std::error_code error;
     std::filesystem::create_directories(path, error);
     if (error)
         return fail(ErrorCode::bad_input, "cannot create {}: {}", quote_path(path), error.message());
+    for (const Path& folder : made)
+        SR_CHECK(flush_names(folder_of(folder)));
     return {};
 }
 
@@ -302,10 +329,7 @@ Status AtomicFile::commit()
     }
     temporary_.clear();
     unfinished_.reset();
-    const Path folder = folder_of(path_);
-    if (const int error = system::flush_folder(folder)) // makes the rename itself survive a power cut
-        return fail(ErrorCode::bad_input, "cannot flush folder {}: {}", quote_path(folder), system::message_of(error));
-    return {};
+    return flush_names(folder_of(path_));
 }
 
 Status write_file_atomically(const Path& path, std::span<const std::byte> bytes)

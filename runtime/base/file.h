@@ -23,7 +23,8 @@ using Path = std::filesystem::path;
 // Paths are of the disk, or of a folder in memory (memory_files.h), which can be read and not written. A folder may
 // have files of both; of two at one path the one in memory is read.
 
-// false when it is absent, or cannot be examined
+// Also true of what cannot be examined (no permission, a failing disk): whoever opens it learns why. To take it for
+// absent would leave out what is there, or write over it.
 bool is_there(const Path& path);
 bool is_file(const Path& path); // a regular one, or a link to one
 bool is_folder(const Path& path);
@@ -36,7 +37,7 @@ Result<std::vector<Path>> list_folders(const Path& folder);
 // listed, or holds 2^22 files or more.
 Result<std::vector<Path>> list_tree(const Path& folder);
 
-// Makes a folder and those above it; it may exist.
+// Makes a folder and those above it, on the disk when this returns; it may exist.
 Status make_folder(const Path& path);
 
 // Reads a whole regular file. The length is checked before anything is allocated. bad_input: it is missing,

@@ -2,12 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/device/profile.h"
 
+#include "runtime/base/file.h"
 #include "runtime/base/json.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
 #include <functional>
 #include <map>
 #include <set>
@@ -37,7 +35,7 @@ void widen(std::vector<Range>& ranges, const std::vector<Statistic>& statistics)
 
 Status Profile::write(const std::string& path) const
 {
-    nlohmann::json trace = nlohmann::json::array();
+    Json trace = Json::array();
     for (const Event& e : events_)
         trace.push_back({{"name", e.name},
                          {"ph", "X"},
@@ -46,11 +44,7 @@ Status Profile::write(const std::string& path) const
                          {"ts", e.begin_us},
                          {"dur", e.duration_us},
                          {"args", {{"groups", e.groups}, {"gflop", e.flops / 1e9}, {"tile", e.tile}}}});
-    std::ofstream out(path);
-    out << json_text(nlohmann::json{{"traceEvents", std::move(trace)}, {"displayTimeUnit", "ms"}});
-    if (!out.flush())
-        return fail(ErrorCode::bad_input, "cannot write the profile '{}': {}", path, std::strerror(errno));
-    return {};
+    return write_file_atomically(path, json_text(Json{{"traceEvents", std::move(trace)}, {"displayTimeUnit", "ms"}}));
 }
 
 std::vector<Profile::Total> Profile::totals() const

@@ -76,7 +76,7 @@ bool says_no_locks(int error);
 int cut(const Path& file, uint64_t bytes);       // to a length
 int flush_folder(const Path& folder);            // what was renamed in it is on the disk
 void remove_file(const Path& file);              // if it is there
-int copy_file(const Path& from, const Path& to); // in place of what is there
+int copy_file(const Path& from, const Path& to); // in place of what is there; on the disk
 
 // Renames a file or folder. Over a network the answer may be lost, and the second try, which nobody sees, finds nothing
 // to rename: what is at `to` then is known again by its number.

@@ -156,7 +156,8 @@ int copy_file(const Path& from, const Path& to)
 {
     std::error_code error;
     std::filesystem::copy_file(from, to, std::filesystem::copy_options::overwrite_existing, error);
-    return error.value();
+    auto copy = error ? tl::unexpected(error.value()) : File::open(to, FileUse::append);
+    return copy ? copy->flush() : copy.error();
 }
 
 int rename_surely(const Path& from, const Path& to)

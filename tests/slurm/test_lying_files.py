@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""A job on a file system that hides new names, has no locks, loses answers and is full: lying_files.c plays it."""
+"""A job on a file system that hides new names, has no locks, loses answers and is full: tests/faults/faulty_files.c."""
+import errno
 import os
+import pathlib
 import random
 import tempfile
 import time
@@ -9,7 +11,7 @@ import unittest
 
 from small_job import SmallJob
 
-LIBRARY = os.environ["LYING_FILES"]
+LIBRARY = os.environ["FAULTY_FILES"]
 
 
 class LyingFiles(unittest.TestCase):
@@ -23,7 +25,7 @@ class LyingFiles(unittest.TestCase):
         cls.honest = cls.job.published("honest")
 
     def lied_to(self, *options, **lies):
-        return self.job.run(*options, out=self.id(), LD_PRELOAD=LIBRARY, **lies)
+        return self.job.run(*options, out=self.id(), LD_PRELOAD=LIBRARY, FAULT_FOLDER=str(self.job.folder), **lies)
 
     def expect_whole(self):
         self.assertEqual(self.job.published(self.id()), self.honest)
@@ -32,36 +34,38 @@ class LyingFiles(unittest.TestCase):
     def test_a_scene_that_is_not_seen_yet_is_waited_for(self):
         self.assertEqual(self.job.run("--stage", "scene", out=self.id()).returncode, 0)
         hide = f"{self.job.folder / self.id()}/scenes:5"
-        early = self.lied_to("--stage", "drive", "--wait", "0", LYING_HIDE=hide)
+        early = self.lied_to("--stage", "drive", "--wait", "0", FAULT_HIDE=hide)
         self.assertEqual(early.returncode, 75, early.stderr)
         begin = time.monotonic()
-        late = self.lied_to("--stage", "drive", LYING_HIDE=hide)
+        late = self.lied_to("--stage", "drive", FAULT_HIDE=hide)
         self.assertEqual(late.returncode, 0, late.stderr)
         self.assertGreater(time.monotonic() - begin, 1)
         self.expect_whole()
 
     def test_without_locks_it_goes_on_and_says_so(self):
-        done = self.lied_to(LYING_LOCKS="1")
+        done = self.lied_to(FAULT=f"lock:1+:{errno.ENOSYS}")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(done.stderr.count("without locks"), 1, done.stderr)
         self.expect_whole()
 
     def test_a_rename_that_worked_and_failed(self):
         """of every folder, each of which is sealed and published, and of some files"""
-        lies = [("LYING_FOLDER", k) for k in range(1, 9)] + [("LYING_FILE", k) for k in (1, 2, 17, 35, 50, 70)]
-        for lie, k in lies:
-            with self.subTest(lie=lie, k=k):
-                out = f"{self.id()}.{lie}.{k}"
-                done = self.job.run(out=out, LD_PRELOAD=LIBRARY, **{lie: str(k)})
+        log = pathlib.Path(self.folder.name) / "log"
+        for kind, k in [("move", k) for k in range(1, 9)] + [("rename", k) for k in (1, 2, 17, 35, 50, 70)]:
+            with self.subTest(kind=kind, k=k):
+                out = f"{self.id()}.{kind}.{k}"
+                lies = {"FAULT_FOLDER": str(self.job.folder), "FAULT": f"{kind}:{k}:{errno.ENOENT}:after"}
+                done = self.job.run(out=out, LD_PRELOAD=LIBRARY, FAULT_LOG=str(log), **lies)
                 self.assertEqual(done.returncode, 0, done.stderr)
-                self.assertIn("lying_files: a rename", done.stderr)
+                self.assertIn(f"FAULT {kind} ", log.read_text())
+                log.unlink()
                 self.assertEqual(self.job.published(out), self.honest)
                 self.assertEqual(self.job.attempts(out), [])
 
     def test_a_full_disk_publishes_nothing_that_is_not_whole(self):
         chance = random.Random(3)
         for k in (1, *(chance.randrange(2, 60) for _ in range(5))):
-            full = self.lied_to(LYING_WRITE=str(k))
+            full = self.lied_to(FAULT=f"write:{k}+:{errno.ENOSPC}")
             self.assertIn(full.returncode, (3, 7), full.stderr)
             self.assertIn("No space left on device", full.stderr)
             for name, value in self.job.published(self.id()).items():

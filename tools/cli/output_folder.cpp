@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/cli/output_folder.h"
 
+#include "runtime/base/final_name.h"
 #include "runtime/base/quote.h"
 
 namespace semrover {
@@ -15,9 +16,10 @@ Result<OutputFolder> OutputFolder::create(const Path& path, bool replace)
     f.path_ = fs::absolute(path, error);
     if (!f.path_.has_filename())
         f.path_ = f.path_.parent_path(); // "name/"
-    if (fs::exists(f.path_, error) && !fs::is_directory(f.path_, error))
+    const bool there = is_there(f.path_);
+    if (there && !is_folder(f.path_))
         return fail(ErrorCode::bad_input, "{} is a file; a folder is needed", quote_path(path));
-    if (fs::exists(f.path_, error) && !replace)
+    if (there && !replace)
         return fail(ErrorCode::usage, "{} exists; -y replaces what is written there", quote_path(path));
     for (int attempt = 0; attempt < 100; ++attempt) { // a killed run with the same pid may have left its name
         const Path name = f.path_.parent_path() / unfinished_name();
@@ -50,23 +52,35 @@ OutputFolder::~OutputFolder()
 Status OutputFolder::commit()
 {
     const Together renamed_and_forgotten;
-    std::error_code error;
-    if (!fs::exists(path_, error)) {
-        fs::rename(temporary_, path_, error);
-        if (!error)
-            temporary_.clear();
-    } else {
-        for (const auto& entry : fs::directory_iterator(temporary_, error)) {
-            const Path to = path_ / entry.path().filename();
-            fs::remove_all(to, error);
-            fs::rename(entry.path(), to, error);
-            if (error)
-                break;
-        }
+    if (!is_there(path_)) {
+        SR_CHECK(rename_whole(temporary_, path_));
+        temporary_.clear();
+        return {};
     }
+    std::error_code error;
+    std::vector<Path> names;
+    for (fs::directory_iterator i(temporary_, error), end; !error && i != end; i.increment(error))
+        names.push_back(i->path().filename());
     if (error)
-        return fail(ErrorCode::bad_input, "cannot write {}: {}", quote_path(path_), error.message());
+        return fail(ErrorCode::bad_input, "cannot list {}: {}", quote_path(temporary_), error.message());
+    for (const Path& name : names)
+        SR_CHECK(replace(name));
     return {};
+}
+
+// what was there goes with the temporary folder, or comes back
+Status OutputFolder::replace(const Path& name) const
+{
+    const Path from = temporary_ / name, to = path_ / name, before = temporary_ / (".before-" + name.string());
+    std::error_code error;
+    fs::rename(to, before, error);
+    const bool moved = !error;
+    if (error && error != std::errc::no_such_file_or_directory)
+        return fail(ErrorCode::bad_input, "cannot replace {}: {}", quote_path(to), error.message());
+    const Status renamed = rename_whole(from, to);
+    if (!renamed && moved && !fs::exists(to, error))
+        fs::rename(before, to, error);
+    return renamed;
 }
 
 } // namespace semrover

@@ -23,6 +23,7 @@ class OutputFolder {
 
   private:
     OutputFolder() = default;
+    Status replace(const Path& name) const;
 
     Path path_, temporary_; // no temporary: done
     std::unique_ptr<Unfinished> unfinished_;

@@ -5,6 +5,7 @@
 #include "engine/model/low_rank.h"
 #include "engine/model/renderer_model.h"
 #include "engine/model/weight_blocks.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
@@ -229,33 +230,27 @@ class StagingFolder {
     Status commit()
     {
         const Together renamed_and_forgotten;
-        std::error_code error;
-        if (!is_there(out_))
-            fs::rename(path_, out_, error);
-        else
-            replace(error);
-        if (error)
-            return fail(ErrorCode::bad_input, "cannot write to {}: {}", quote_path(out_), error.message());
-        return {};
+        return is_there(out_) ? replace() : rename_whole(path_, out_);
     }
 
   private:
     // file by file: what else lies in the folder stays, but for weights that would hide the new ones
-    void replace(std::error_code& error)
+    Status replace() const
     {
-        std::vector<Path> files;
-        for (const auto& entry : fs::recursive_directory_iterator(path_, error))
-            if (entry.is_regular_file())
-                files.push_back(entry.path().lexically_relative(path_));
+        SR_TRY(std::vector<Path> files, list_tree(path_));
+        for (Path& file : files)
+            file = file.lexically_relative(path_);
+        std::error_code error;
         for (const Path& file : files)
             if (!error && file.filename().string().starts_with("diffusion_pytorch_model"))
                 remove_weights(out_ / file.parent_path(), error);
+        if (error)
+            return fail(ErrorCode::bad_input, "cannot write to {}: {}", quote_path(out_), error.message());
         for (const Path& file : files) {
-            if (!error)
-                fs::create_directories((out_ / file).parent_path(), error);
-            if (!error)
-                fs::rename(path_ / file, out_ / file, error);
+            SR_CHECK(make_folder((out_ / file).parent_path()));
+            SR_CHECK(rename_whole(path_ / file, out_ / file));
         }
+        return {};
     }
 
     static void remove_weights(const Path& folder, std::error_code& error)
@@ -303,13 +298,11 @@ Status write_conversion(Conversion& plan, const Path& out, const Globals& global
         SR_CHECK(write_json(staging.path() / name, json));
     for (const auto& [name, from] : plan.copies) {
         SR_TRY(const MappedFile file, MappedFile::open(from));
-        std::error_code error;
-        fs::create_directories((staging.path() / name).parent_path(), error);
+        SR_CHECK(make_folder((staging.path() / name).parent_path()));
         SR_CHECK(write_file_atomically(staging.path() / name, file.bytes()));
     }
     if (plan.text) {
-        std::error_code error;
-        fs::create_directories(staging.path() / "conditioning", error);
+        SR_CHECK(make_folder(staging.path() / "conditioning"));
         SR_CHECK(stream_safetensors(staging.path() / "conditioning" / "conditioning.safetensors",
                                     std::span(&*plan.text, 1)));
     }

@@ -3,6 +3,7 @@
 #include "tools/commands/convert.h"
 
 #include "engine/world/world_objects.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/value_options.h"
@@ -21,9 +22,7 @@ Status check_output(const Path& in, const Path& out, const Globals& globals)
         return fail(ErrorCode::usage, "{}: boxes become objects, in a file that ends with .json", quote_path(out));
     if (std::filesystem::equivalent(in, out, ignored))
         return fail(ErrorCode::usage, "IN and OUT are the same, {}", quote_path(out));
-    if (is_there(out) && !globals.yes)
-        return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(out));
-    return {};
+    return refuse_existing(out, globals.yes);
 }
 
 Json classes_of(std::span<const SceneObject> objects)

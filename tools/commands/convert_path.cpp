@@ -4,6 +4,7 @@
 
 #include "engine/format/labelled_points.h"
 #include "engine/shards/shard_set.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/print_stderr.h"
@@ -74,8 +75,7 @@ Status check_output(const Path& in, const Path& out, const ConvertPathOptions& o
     if (format == PathFormat::kitti)
         files = {out, out.parent_path() / "times.txt", out.parent_path() / "calib.txt"};
     for (const Path& path : files)
-        if (is_there(path) && !globals.yes)
-            return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(path));
+        SR_CHECK(refuse_existing(path, globals.yes));
     return {};
 }
 

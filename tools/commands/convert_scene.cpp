@@ -4,6 +4,7 @@
 
 #include "engine/scene/palette.h"
 #include "engine/splat/blocks.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/open_device.h"
 #include "tools/cli/option_facts.h"
@@ -63,8 +64,7 @@ Status check_output(const ConvertSceneOptions& o, SceneFormat format, const Glob
         std::error_code ignored;
         if (fs::equivalent(o.in, file, ignored))
             return fail(ErrorCode::usage, "IN and OUT are the same, {}", quote_path(file));
-        if (fs::exists(file) && !globals.yes)
-            return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(file));
+        SR_CHECK(refuse_existing(file, globals.yes));
         SR_CHECK(AtomicFile::create(file).map([](const AtomicFile&) {}));
     }
     return {};

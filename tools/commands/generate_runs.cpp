@@ -45,7 +45,7 @@ double seconds_now()
 
 Result<uint64_t> hash_input(const Path& path)
 {
-    return fs::is_directory(path) ? hash_folder(path) : hash_file(path);
+    return is_folder(path) ? hash_folder(path) : hash_file(path);
 }
 
 } // namespace
@@ -75,10 +75,10 @@ std::vector<Path> GridRun::written_files(bool with_objects) const
     return files;
 }
 
-Status GridRun::check_outputs() const
+Status GridRun::check_outputs(bool replace) const
 {
     for (const Path& path : written_files(!generation_.model.config.condition.empty()))
-        SR_CHECK(check_writable(path, globals_.yes));
+        SR_CHECK(check_writable(path, replace));
     return {};
 }
 
@@ -90,15 +90,15 @@ Result<bool> GridRun::begin()
     if (o_.order == "scene" && o_.tile_size)
         return fail(ErrorCode::usage, "--tile-size has a meaning with --order tiles and --along");
     SR_CHECK(refuse_given(*o_.input.command, placement_options(), "a grid without --along"));
-    if (!dry_run && !finished_results(folder(), Json())) // that one may be the same
-        SR_CHECK(check_outputs());
+    if (!dry_run && !is_there(folder() / "run.json")) // that one may be the same
+        SR_CHECK(check_outputs(globals_.yes));
     SR_CHECK(read());
     SR_TRY(device_, open_device(globals_, o_.generation.profile));
     SR_CHECK(look());
     if (!dry_run && finished_before())
         return true;
     if (!dry_run)
-        SR_CHECK(check_outputs());
+        SR_CHECK(check_outputs(globals_.yes || goes_on(folder(), settings_)));
     warn_of_placement(generation_.model, grid_, display_.callbacks());
     SR_CHECK(open_world_in_run());
     if (!dry_run)
@@ -144,7 +144,7 @@ bool GridRun::finished_before()
         return false;
     finished_ = finished_results(folder(), settings_, o_.output);
     for (const Path& path : written_files(!objects_->empty()))
-        if (!fs::exists(path))
+        if (!is_there(path))
             finished_.reset();
     return finished_.has_value();
 }
@@ -227,9 +227,9 @@ Status TilesRun::check() const
     if (o_.generation.dry_run)
         return {};
     // of a run, the settings say whether it is this one
-    if (TileFolder::is_one(o_.output) && !globals_.yes && !fs::exists(folder() / "run.json"))
+    if (TileFolder::is_one(o_.output) && !globals_.yes && !is_there(folder() / "run.json"))
         return fail(ErrorCode::usage, "{} exists; -y replaces it", quote(o_.output));
-    if (fs::exists(o_.output) && !fs::is_directory(o_.output))
+    if (is_there(o_.output) && !is_folder(o_.output))
         return fail(ErrorCode::bad_input, "{} is a file; --along writes a folder of tiles", quote(o_.output));
     return {};
 }
@@ -248,7 +248,7 @@ Status TilesRun::read()
     lens.matters = false; // where the camera is
     SR_TRY(const CameraPath path, read_camera_path(o_.along, lens, placement_));
     track_ = ground_track(path);
-    if (fs::is_directory(o_.grid)) {
+    if (is_folder(o_.grid)) {
         SR_TRY(const TileFolder tiles, TileFolder::open(o_.grid));
         metadata_ = tiles.metadata();
         SR_TRY(labels_, labels_of_folder(o_.grid));

@@ -81,7 +81,7 @@ class GridRun : public GenerateRun {
 
   private:
     std::vector<Path> written_files(bool with_objects) const;
-    Status check_outputs() const;
+    Status check_outputs(bool replace) const;
     Status read();
     Status look(); // from here on objects_ are those that condition the model
     bool finished_before();

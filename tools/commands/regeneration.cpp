@@ -4,6 +4,7 @@
 
 #include "engine/job/outputs.h"
 #include "engine/job/version.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/open_device.h"
@@ -46,7 +47,7 @@ Path undo_of(const Path& output)
 // a seed of several that an earlier start of the same command has finished; its results
 std::optional<Json> finished_before(const Path& output, const Json& settings)
 {
-    return fs::exists(undo_of(output)) ? finished_results(run_folder_of(output), settings, output) : std::nullopt;
+    return is_there(undo_of(output)) ? finished_results(run_folder_of(output), settings, output) : std::nullopt;
 }
 
 // the grid with its objects, then what takes it back
@@ -65,10 +66,11 @@ Result<Json> write_result(const Regeneration& what, const Path& output, const Vo
 }
 
 // what edit and inpaint do without a model: the targets are left without points
-Result<Json> leave_without_points(const Regeneration& what, const RegenerationArguments& o)
+Result<Json> leave_without_points(const Regeneration& what, const RegenerationArguments& o, const Globals& globals)
 {
     Json results = what.counts;
     for (const uint64_t seed : seeds_of(o)) {
+        SR_CHECK(refuse_existing(output_of(o, seed), globals.yes));
         VoxelGrid grid = what.grid;
         for (const uint32_t target : what.targets)
             if (grid.has_points())
@@ -156,8 +158,7 @@ Result<Json> run_to_end(SeedRun run, const Path& output, bool several, bool warn
     const Path folder = run_folder_of(output);
     if (const auto results = finished_before(output, run.settings()); results && !globals.yes && several)
         return *results;
-    if (fs::exists(output) && !globals.yes)
-        return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(output));
+    SR_CHECK(refuse_existing(output, globals.yes || goes_on(folder, run.settings())));
     SR_CHECK(run.open(callbacks));
     SR_CHECK(run.keep_in(folder, globals.yes));
     SR_CHECK(step_to_end(run.world(), folder));
@@ -227,22 +228,22 @@ Status check_outputs(const Path& input, const RegenerationArguments& o, const Gl
         std::error_code ignored;
         if (fs::equivalent(input, output, ignored)) // the record of what was there is made from it at the end
             return fail(ErrorCode::usage, "input and output are the same, '{}'", output.string());
+        const Path run = run_folder_of(output);
+        const bool ours = is_there(run) && !finished_results(run, Json()); // it may go on: its settings will say
         if (o.seeds.size() < 2 || !finished_before(output, Json()))
             for (const Path& path : {output, objects_beside(output)})
-                SR_CHECK(check_writable(path, globals.yes));
-        if (!fs::exists(run_folder_of(output))) // the record is not of a run of ours that goes on
-            SR_CHECK(check_writable(undo_of(output), globals.yes));
+                SR_CHECK(check_writable(path, globals.yes || ours));
+        SR_CHECK(check_writable(undo_of(output), globals.yes || ours));
     }
     return {};
 }
 
 Result<GivenObjects> objects_of(const Path& grid, const RegenerationArguments& o)
 {
-    std::error_code ignored;
     const Path beside = objects_beside(grid);
     if (!o.objects.empty())
         return given_objects(o.objects);
-    return given_objects(fs::exists(beside, ignored) ? beside.string() : "auto");
+    return given_objects(is_there(beside) ? beside.string() : "auto");
 }
 
 Status regenerate(const Regeneration& what, const RegenerationArguments& o, const Globals& globals)
@@ -252,7 +253,7 @@ Status regenerate(const Regeneration& what, const RegenerationArguments& o, cons
         fmt::print("nothing to generate\n");
         return {};
     }
-    SR_TRY(const Json results, generates ? generate_targets(what, o, globals) : leave_without_points(what, o));
+    SR_TRY(const Json results, generates ? generate_targets(what, o, globals) : leave_without_points(what, o, globals));
     if (o.generation.dry_run)
         print_estimate(results, globals);
     else

@@ -5,6 +5,7 @@
 #include "engine/scene/tiles.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/commands.h"
+#include "tools/cli/output_folder.h"
 #include "tools/cli/value_options.h"
 
 #include <CLI/CLI.hpp>
@@ -30,22 +31,33 @@ Status join(const TileArguments& o, const Globals& globals)
     return {};
 }
 
-Status cut(const TileArguments& o, const Globals& globals)
+// an empty folder may be there: the tiles' own takes its place, whole
+Status make_room(const Path& output)
 {
     namespace fs = std::filesystem;
+    if (!is_there(output))
+        return output.has_parent_path() ? make_folder(output.parent_path()) : Status();
+    if (!is_folder(output))
+        return fail(ErrorCode::usage, "{} is a file; tiles are written to a folder", quote_path(output));
     std::error_code error;
-    if (fs::exists(o.output) && !fs::is_directory(o.output))
-        return fail(ErrorCode::usage, "'{}' is a file; tiles are written to a folder", o.output);
-    if (fs::exists(o.output) && !fs::is_empty(o.output, error))
-        return fail(ErrorCode::usage, "'{}' is not empty: tiles of two scenes must not mix", o.output);
+    const bool empty = fs::is_empty(output, error);
+    if (!error && !empty)
+        return fail(ErrorCode::usage, "{} is not empty: tiles of two scenes must not mix", quote_path(output));
+    if (!error)
+        fs::remove(output, error);
+    if (error)
+        return fail(ErrorCode::bad_input, "cannot write to {}: {}", quote_path(output), error.message());
+    return {};
+}
+
+Status cut(const TileArguments& o, const Globals& globals)
+{
     SR_TRY(const VoxelGrid grid, read_grid(o.input));
     SR_TRY(const int32_t edge, tile_cells_of(o.tile_size, grid.voxel_size));
-    const bool existed = fs::exists(o.output);
-    if (const Status written = write_tiles(o.output, grid, edge); !written) {
-        if (!existed)
-            fs::remove_all(o.output, error);
-        return written;
-    }
+    SR_CHECK(make_room(o.output));
+    SR_TRY(OutputFolder out, OutputFolder::create(o.output, false));
+    SR_CHECK(write_tiles(out.path(), grid, edge));
+    SR_CHECK(out.commit());
     if (globals.json)
         fmt::print("{}\n", json_text(Json{{"tiles", cut_tiles(grid, edge).size()}, {"cells", grid.cells.size()}}));
     return {};

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/commands/video.h"
 
+#include "runtime/base/final_name.h"
 #include "runtime/base/quote.h"
 
 #include <cerrno>
@@ -19,6 +20,15 @@ Result<system::Process> start_ffmpeg(const std::vector<std::string>& arguments)
     if (!child)
         return fail(ErrorCode::bad_input, "cannot start ffmpeg: {}", system::message_of(child.error()));
     return std::move(*child);
+}
+
+Status flush_and_rename(const Path& from, const Path& to)
+{
+    auto file = system::File::open(from, system::FileUse::append);
+    const int error = file ? file->flush() : file.error();
+    if (error)
+        return fail(ErrorCode::bad_input, "cannot write {}: {}", quote_path(to), system::message_of(error));
+    return rename_whole(from, to);
 }
 
 } // namespace
@@ -67,17 +77,11 @@ Status Video::finish()
     const Together renamed_and_forgotten;
     child_.reset();
     unfinished_.reset();
-    if (code != 0) {
+    Status done = code == 0 ? flush_and_rename(temporary_, path_)
+                            : fail(ErrorCode::bad_input, "ffmpeg could not write {}", quote_path(path_));
+    if (!done)
         system::remove_file(temporary_);
-        return fail(ErrorCode::bad_input, "ffmpeg could not write {}", quote_path(path_));
-    }
-    std::error_code error;
-    std::filesystem::rename(temporary_, path_, error);
-    if (error) {
-        system::remove_file(temporary_);
-        return fail(ErrorCode::bad_input, "cannot write {}: {}", quote_path(path_), error.message());
-    }
-    return {};
+    return done;
 }
 
 } // namespace semrover

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/editing/editing.h"
 
+#include "runtime/base/final_name.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
@@ -268,11 +269,7 @@ Status undo_edit(const Path& record, const Path& edited, const Path& output)
     if (hash_text(found) != r.before)
         return fail(ErrorCode::bad_input, "{} does not give the grid back: the hash is {}, expected {}",
                     quote_path(record), hash_text(found), quote(r.before));
-    std::error_code error;
-    std::filesystem::rename(whole.path(), output, error);
-    if (error)
-        return fail(ErrorCode::bad_input, "cannot write {}: {}", quote_path(output), error.message());
-    return {};
+    return rename_whole(whole.path(), output);
 }
 
 } // namespace semrover

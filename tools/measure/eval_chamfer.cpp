@@ -5,6 +5,7 @@
 #include "engine/mesh/mesh_files.h"
 #include "engine/mesh/surface_blocks.h"
 #include "engine/mesh/voxelizer.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/camera_options.h"
@@ -190,8 +191,8 @@ Status eval_chamfer(const EvalChamferArguments& o, const Globals& globals)
 {
     if (!o.grid.empty() && !o.sweep.empty())
         return fail(ErrorCode::usage, "--sweep makes its own grids; give either POINTS or --sweep");
-    if (!o.csv.empty() && std::filesystem::exists(o.csv) && !globals.yes)
-        return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(o.csv));
+    if (!o.csv.empty())
+        SR_CHECK(refuse_existing(o.csv, globals.yes));
     if (!o.sweep.empty()) {
         SR_CHECK(points_of_sweep(o.sweep));
     }

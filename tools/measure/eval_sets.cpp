@@ -3,6 +3,7 @@
 #include "tools/measure/eval_sets.h"
 
 #include "engine/scene/grid.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
 #include "runtime/base/safetensors.h"
@@ -250,10 +251,8 @@ Path saved_path(const EvalOptions& o, size_t side)
 
 Status check_outputs(const EvalOptions& o, const Globals& globals)
 {
-    std::error_code error;
     for (size_t side = 0; side < 2 && !o.save.empty(); ++side)
-        if (fs::exists(saved_path(o, side), error) && !globals.yes)
-            return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(saved_path(o, side)));
+        SR_CHECK(refuse_existing(saved_path(o, side), globals.yes));
     return {};
 }
 

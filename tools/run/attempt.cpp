@@ -51,10 +51,11 @@ bool is_known_dead(const Path& attempt)
 // a hard link, or a copy where the file system has none
 bool take_file(const Path& from, const Path& to)
 {
+    if (!make_folder(to.parent_path()))
+        return false;
     std::error_code error;
-    fs::create_directories(to.parent_path(), error);
     fs::create_hard_link(from, to, error);
-    return !error || system::copy_file(from, to) == 0;
+    return (!error || system::copy_file(from, to) == 0) && system::flush_folder(to.parent_path()) == 0;
 }
 
 bool is_state(const std::string& name)

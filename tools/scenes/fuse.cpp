@@ -6,6 +6,7 @@
 #include "engine/mesh/mesh_files.h"
 #include "engine/mesh/voxelizer.h"
 #include "engine/scene/palette.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/camera_options.h"
@@ -60,12 +61,10 @@ Status resolve(FuseArguments& o, const Globals& globals)
     o.input.poses = o.poses;
     SR_TRY(o.input.placement, placement_of(o.placement));
     o.input.map = o.map;
-    std::error_code error;
-    if (fs::exists(o.output, error) && !fs::is_directory(o.output, error))
+    if (is_there(o.output) && !is_folder(o.output))
         return fail(ErrorCode::usage, "{} is a file, expected a folder", quote_path(o.output));
     for (const Path& path : Outputs(o.output, o.mesh_format).all())
-        if (fs::exists(path, error) && !globals.yes)
-            return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(path));
+        SR_CHECK(refuse_existing(path, globals.yes));
     return {};
 }
 

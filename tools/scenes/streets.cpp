@@ -246,8 +246,7 @@ Status streets(const StreetsArguments& o, const Globals& globals)
     SR_CHECK(write_glb(out / "mesh.glb", street.mesh));
     SR_CHECK(write_tum(out / "drive.tum", path));
     SR_CHECK(write_transforms(out / "transforms.json", path, files_of(o.pictures)));
-    std::error_code error;
-    std::filesystem::create_directory(out / "shifted", error);
+    SR_CHECK(make_folder(out / "shifted"));
     SR_CHECK(write_transforms(out / "shifted/transforms.json", shifted, files_of(o.pictures && o.shift != 0)));
     Json about = street_json(o, street, path);
     std::vector<Actor> actors;

@@ -7,6 +7,7 @@
 #include "engine/mesh/voxelizer.h"
 #include "engine/scene/palette.h"
 #include "engine/scene/scene_points.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/camera_options.h"
@@ -40,8 +41,8 @@ LabelSource source_of(const std::string& name)
 Status check_outputs(const VoxelizeArguments& o, const Globals& globals)
 {
     for (const std::string& path : {o.output, o.ply})
-        if (!path.empty() && std::filesystem::exists(path) && !globals.yes)
-            return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(path));
+        if (!path.empty())
+            SR_CHECK(refuse_existing(path, globals.yes));
     return {};
 }
 

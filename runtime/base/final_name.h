@@ -1,0 +1,15 @@
+// SPDX-FileCopyrightText: semrover authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "runtime/base/file.h"
+
+namespace semrover {
+
+// usage where something is there that is not to be replaced; bad_input where that cannot be told
+Status refuse_existing(const Path& path, bool replace);
+
+// Gives what is whole and on the disk, a file or folder, its final name; the name is on the disk when this returns.
+Status rename_whole(const Path& from, const Path& to);
+
+} // namespace semrover
