@@ -95,7 +95,7 @@ BEGINS_AGAIN = {
 }
 COMMANDS = {**GOES_ON, **BEGINS_AGAIN}
 # that want -y where they ended after a file of theirs had its name
-MAY_WANT_YES = {*BEGINS_AGAIN, "generate", "generate_cold", "generate_tiles"}
+MAY_WANT_YES = {*BEGINS_AGAIN}
 OF_SCENES = ("voxelize", "fuse", "streets")
 
 STATE = ("lock", "journal.jsonl")
