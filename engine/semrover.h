@@ -26,6 +26,13 @@
  * Callbacks run on the thread that calls, before the call returns. Strings that the library returns are static.
  * Everything that a call is given is copied before it returns, but for what belongs to Vulkan, and models in memory
  * (sr_file). Handles are destroyed before what they were made with, but for models.
+ *
+ * Where memory ends, of the device, of a budget or of the host, a call returns SR_ERR_OUT_OF_MEMORY. All handles stay
+ * good, and the call may be made again: edits, foci and voxels that were set are kept. Of a frame that is refined the
+ * next call is sr_renderer_begin. A tile that a thread cannot write into a cache is a warning. After SR_ERR_DEVICE_LOST
+ * every call that needs the device returns it again; destroy all that is on the context, and make another one. To
+ * destroy is always possible. The process ends only by the system's own policy: Linux may kill it where it has promised
+ * more memory than there is.
  */
 #ifndef SEMROVER_H
 #define SEMROVER_H

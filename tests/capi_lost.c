@@ -1,9 +1,9 @@
 /* SPDX-FileCopyrightText: semrover authors
  * SPDX-License-Identifier: Apache-2.0
  *
- * A host whose GPU is lost after some submits: each call says so with a status and a line, everything can be destroyed,
- * and another context goes on. The GPU is lost by the layer of tests/vendors/losing_gpu.cpp.
- *     capi_lost MODEL */
+ * A host whose GPU is lost at one of its submits: each call says so with a status and a line, everything can be
+ * destroyed, and another context goes on. The GPU is lost by the layer of tests/vendors/failing_gpu.cpp. capi_lost
+ * MODEL */
 #include "tests/support/capi_street.h"
 
 #include <sys/wait.h>
@@ -43,18 +43,18 @@ static void check_lost(const sr_context* context, sr_status status)
 }
 
 /* in a process of its own: the layer counts submits for the life of one */
-static void loses_it_after(const char* submits)
+static void loses_it_at(const char* submit)
 {
     sr_context_desc desc;
     sr_context* context = NULL;
     sr_world* world = NULL;
     sr_status status;
-    setenv("LOSING_GPU_SUBMITS", submits, 1);
+    setenv("FAILING_GPU_AT", submit, 1);
     memset(&desc, 0, sizeof desc);
     desc.struct_size = sizeof desc;
     CHECK(sr_context_create(&desc, &context) == SR_OK);
     status = live(context, &world);
-    fprintf(stderr, "lost after %s submits: %s\n", submits, sr_status_name(status));
+    fprintf(stderr, "lost at submit %s: %s\n", submit, sr_status_name(status));
     check_lost(context, status);
     check_lost(context, live(context, &world)); /* and the next call, too */
     sr_world_destroy(world);
@@ -71,7 +71,7 @@ static void loses_it_after(const char* submits)
 
 int main(int argc, char** argv)
 {
-    const char* counts[] = {"0", "3", "10", "30", "60"};
+    const char* counts[] = {"1", "4", "11", "31", "61"};
     size_t i;
     CHECK(argc == 2);
     model = argv[1];
@@ -80,7 +80,7 @@ int main(int argc, char** argv)
         const pid_t child = fork();
         CHECK(child >= 0);
         if (!child) {
-            loses_it_after(counts[i]);
+            loses_it_at(counts[i]);
             exit(0);
         }
         CHECK(waitpid(child, &ended, 0) == child && WIFEXITED(ended) && WEXITSTATUS(ended) == 0);

@@ -110,8 +110,8 @@ TEST(engine_file_queue, short_memory_in_a_thread_is_an_error_of_the_queue)
         FileQueue queue(2);
         ASSERT_TRUE(queue.push(1, good));
         (void)queue.push(1, short_of_memory);
-        EXPECT_TRUE(says(queue.drain(), "no host memory to make a file"));
-        EXPECT_TRUE(says(queue.push(1, good), "no host memory to make a file"));
+        EXPECT_TRUE(says(queue.drain(), "no host memory"));
+        EXPECT_TRUE(says(queue.push(1, good), "no host memory"));
     }
 }
 

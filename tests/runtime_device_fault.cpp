@@ -26,6 +26,17 @@ TEST(runtime_device_fault, tells_all_that_a_driver_says)
                         std::string(sizeof vendor.description, 'x') + " (code 0x7, data 0x0)");
 }
 
+TEST(runtime_device_fault, names_the_call_and_says_what_kind_of_error_it_is)
+{
+    const Error memory =
+        vk_error(VK_ERROR_OUT_OF_HOST_MEMORY, "device_.vk().CreateBufferView(device_.handle(), &info)");
+    EXPECT_EQ(memory.message, "VK_ERROR_OUT_OF_HOST_MEMORY (-1) from vkCreateBufferView");
+    EXPECT_EQ(memory.code, ErrorCode::out_of_memory);
+    EXPECT_EQ(vk_error(VK_ERROR_MEMORY_MAP_FAILED, "vk.MapMemory(d)").code, ErrorCode::out_of_memory);
+    EXPECT_EQ(vk_error(VK_ERROR_FRAGMENTED_POOL, "vkCreateThing").message,
+              "VK_ERROR_FRAGMENTED_POOL (-12) from vkCreateThing");
+}
+
 // other errors are as they are: nobody is asked
 TEST(runtime_device_fault, asks_for_lost_devices_only)
 {

@@ -21,6 +21,9 @@ sr_status remember(sr_context* context, sr_status status, std::string message) n
 // may be at work at the same time, others alone, and those that lock for themselves at any time.
 enum Use : uint32_t { kAnyTime = 0, kWork = 1, kDraw = 2, kAlone = 3 };
 
+// a line where there may be no memory for it; then less, which a string holds without allocating
+std::string line_of(const char* text) noexcept;
+
 // A call's right to its context, if any. Not taken: another call uses that part, or this one is made by a callback of
 // another one with the same context, on whichever part.
 class Turn {
@@ -65,9 +68,9 @@ sr_status guarded(sr_context* context, F f) noexcept
             return remember(context, sr_status(status.error().code), std::move(status.error().message));
         return SR_OK;
     } catch (const std::bad_alloc&) {
-        return remember(context, SR_ERR_OUT_OF_MEMORY, ""); // a text might not fit either
+        return remember(context, SR_ERR_OUT_OF_MEMORY, kNoHostMemory);
     } catch (const std::exception& error) {
-        return remember(context, SR_ERR_INTERNAL, error.what());
+        return remember(context, SR_ERR_INTERNAL, line_of(error.what()));
     } catch (...) {
         return remember(context, SR_ERR_INTERNAL, "internal");
     }

@@ -160,8 +160,17 @@ Turn::~Turn()
 sr_status Turn::refuse() noexcept
 {
     return remember(nullptr, SR_ERR_USAGE,
-                    "another call is at work with this context: of another thread, or the one "
-                    "whose callback this is");
+                    line_of("another call is at work with this context: of another thread, or the one "
+                            "whose callback this is"));
+}
+
+std::string line_of(const char* text) noexcept
+{
+    try {
+        return text;
+    } catch (const std::bad_alloc&) {
+        return kNoHostMemory;
+    }
 }
 
 sr_status remember(sr_context* context, sr_status status, std::string message) noexcept

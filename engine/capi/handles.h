@@ -15,6 +15,7 @@
 #include "runtime/device/external_copies.h"
 
 #include <atomic>
+#include <list>
 #include <mutex>
 
 // what the handles of the C interface hold
@@ -37,7 +38,8 @@ struct sr_grid {
     semrover::VoxelGrid& read() const
     {
         if (!edits.empty())
-            grid = with_edits(grid, std::exchange(edits, {}));
+            grid = with_edits(grid, edits); // may throw: they stay until it has them
+        edits.clear();
         return grid;
     }
 };
@@ -68,7 +70,7 @@ struct sr_world {
     std::mutex post;
     semrover::WorldFoci foci; // none: they are as before
     semrover::LabelEdits edits;
-    std::vector<semrover::CellWindow> labels_ready;
+    std::list<semrover::CellWindow> labels_ready;
     sr_world_info info = {}; // as the last call left it
     // of the thread that draws
     semrover::ObjectsById objects; // that it was given

@@ -3,6 +3,7 @@
 // worlds: opened, walked through, edited
 #include "engine/capi/edits.h"
 #include "engine/capi/exchange.h"
+#include "engine/capi/posts.h"
 #include "engine/scene/cell_reach.h"
 #include "engine/scene/palette.h"
 #include "engine/scene/tiles.h"
@@ -211,25 +212,6 @@ sr_status with_world(sr_world* world, const char* name, F f) noexcept
             return fail(ErrorCode::usage, "{}: world is NULL", name);
         return f();
     });
-}
-
-// what was posted is done; by the call that works
-Status take_posts(sr_world& world)
-{
-    WorldFoci foci;
-    LabelEdits edits;
-    std::vector<CellWindow> ready;
-    {
-        const std::lock_guard lock(world.post);
-        std::swap(foci, world.foci);
-        std::swap(edits, world.edits);
-        std::swap(ready, world.labels_ready);
-    }
-    for (const CellWindow& window : ready)
-        world.world->labels_ready(window);
-    if (!edits.empty())
-        SR_CHECK(world.world->edit(edits));
-    return foci.empty() ? Status() : world.world->focus(foci);
 }
 
 Status post_foci(sr_world& world, std::span<const sr_focus> given)

@@ -19,27 +19,18 @@ constexpr uint32_t kMostThreads = 16;
 constexpr size_t kRoom = 8; // tasks that wait, beside two a thread
 constexpr uint64_t kMostBytes = 512ull << 20;
 
-// an exception that leaves a thread ends the process
-template <typename F>
-auto unless_memory_is_short(const F& f) -> decltype(f())
-{
-    try {
-        return f();
-    } catch (const std::bad_alloc&) {
-        return fail(ErrorCode::out_of_memory, "no host memory to make a file");
-    }
-}
-
 } // namespace
 
 FileQueue::FileQueue(uint32_t threads)
 {
     const uint32_t count = threads ? threads : usable_threads();
     room_ = kRoom + 2 * (count - 1);
+    threads_.reserve(count); // from here on nothing may leave threads behind
     try {
         while (threads_.size() < count)
             threads_.emplace_back([this] { work(); });
     } catch (const std::system_error&) { // no more threads: those that are there do it, or the caller
+    } catch (const std::bad_alloc&) {
     }
 }
 

@@ -52,16 +52,19 @@ Status TileStore::write(const TileIndex& tile, uint64_t key, VoxelGrid cells)
     if (read_only_)
         return {};
     SR_CHECK(status_);
-    entries_[tile] = {cells.cells.size(), hash_text(key)};
-    changed_ = true;
-    waiting_.insert(tile);
+    const TileEntry entry{cells.cells.size(), hash_text(key)};
     const uint64_t bytes = bytes_of(cells);
+    waiting_.insert(tile);
     status_ =
         files_->push(bytes,
                      [path = folder_ / tile_name(tile, hash_text(key)),
                       cells = std::move(cells)]() mutable -> Result<FileQueue::Commit> {
                          return [path = std::move(path), cells = std::move(cells)] { return write_grid(path, cells); };
                      });
+    if (status_) { // the index names no tile that is not on its way
+        entries_[tile] = entry;
+        changed_ = true;
+    }
     return status_;
 }
 

@@ -137,11 +137,8 @@ Status World::focus(const WorldFoci& foci)
     SR_CHECK(check_foci(foci, voxel_size()));
     if (is_nearly(foci_, foci, edge()))
         return {};
-    foci_ = foci;
     releases_ = false;
-    want(TileOrder(foci, edge()));
-    if (has_model())
-        tiles_->keep_objects_near(window_around(foci, 2 * edge(), voxel_size()));
+    want(TileOrder(foci, edge()), foci);
     return {};
 }
 
@@ -151,9 +148,8 @@ Status World::follow(std::span<const GroundPoint> track, double horizon)
     if (!(horizon > 0 && horizon <= kMostHorizon))
         return fail(ErrorCode::usage, "a horizon: expected metres above 0 and up to {}, found {}", kMostHorizon,
                     horizon);
-    foci_.clear();
     releases_ = true;
-    want(TileOrder(tiles_along(track, horizon, edge())));
+    want(TileOrder(tiles_along(track, horizon, edge())), {});
     say();
     return {};
 }
@@ -168,22 +164,25 @@ Status World::everywhere(RunFolder* run)
         return {};
     }
     SR_TRY(std::vector<TileIndex> all, labels_->tiles(tile_cells()));
-    foci_.clear();
     releases_ = false;
-    want(TileOrder(std::move(all)));
+    want(TileOrder(std::move(all)), {});
     say();
     return {};
 }
 
-void World::want(TileOrder order)
+void World::want(TileOrder order, WorldFoci foci)
 {
+    foci_.clear(); // until all is as they want it: what throws here is asked for again
     order_ = std::move(order);
     released_.clear();
     waiting_.clear();
     full_ = false;
-    if (splats_)
-        splats_->want(foci_);
     look_again();
+    if (splats_)
+        splats_->want(foci);
+    if (has_model() && !foci.empty())
+        tiles_->keep_objects_near(window_around(foci, 2 * edge(), voxel_size()));
+    foci_ = std::move(foci);
 }
 
 World::Piece World::next_piece() const
@@ -215,16 +214,14 @@ Result<bool> World::step(const JobBudget& budget)
             done = false;
             break;
         }
-        Status status;
-        if (submits) {
-            const auto filled = filling_.step({.submits = 1, .microseconds = budget.timed() ? kNoDeadline : ~0ull});
-            status = filled ? Status() : tl::make_unexpected(filled.error());
-            filled_ = filled && *filled;
-        } else {
-            status = do_piece(piece);
-        }
-        if (status && scene_ && filled_)
-            status = finish();
+        const Status status = unless_memory_is_short([&]() -> Status {
+            if (submits) {
+                SR_TRY(filled_, filling_.step({.submits = 1, .microseconds = budget.timed() ? kNoDeadline : ~0ull}));
+            } else {
+                SR_CHECK(do_piece(piece));
+            }
+            return scene_ && filled_ ? finish() : Status();
+        });
         if (!status) {
             give_up();
             done = tl::make_unexpected(status.error());

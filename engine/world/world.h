@@ -129,7 +129,7 @@ class World {
     Status open_scene();
     Status open_tiles();
     Status warm_up();
-    void want(TileOrder order);
+    void want(TileOrder order, WorldFoci foci);
     void look_again();
     Piece next_piece() const;
     Status do_piece(Piece piece);

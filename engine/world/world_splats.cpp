@@ -196,14 +196,16 @@ Result<SplatPool::Room> WorldSplats::add(const TileIndex& index, const VoxelGrid
     return room;
 }
 
-// One that is dropped meanwhile has none. Where there is no room, coarser ones may fit.
+// One that is dropped meanwhile has none. Where there is no room, coarser ones may fit. It stays the next one until it
+// has them: what fails is tried again.
 Status WorldSplats::make_next()
 {
     const TileIndex index = bare_.front();
-    bare_.erase(bare_.begin());
     const VoxelGrid* cells = finished(index);
-    if (!cells || has_splats(index))
+    if (!cells || has_splats(index)) {
+        bare_.erase(bare_.begin());
         return {};
+    }
     const uint32_t wanted = detail(index), coarsest = options_.detail_distance > 0 ? kCoarsestDetail : 0;
     SplatPool::Room room = SplatPool::Room::none;
     for (uint32_t detail = wanted; room == SplatPool::Room::none && detail <= coarsest; ++detail) {
@@ -211,13 +213,13 @@ Status WorldSplats::make_next()
         full_ = full_ || room != SplatPool::Room::found;
     }
     if (room == SplatPool::Room::later) { // in another step, when what leaves has left
-        bare_.insert(bare_.begin(), index);
         no_room_yet_ = true;
         return {};
     }
     if (room == SplatPool::Room::found)
         made_for_[index] = {wanted, neighbours_with_points(index)};
     stale_.erase(index);
+    bare_.erase(bare_.begin());
     return {};
 }
 

@@ -4,12 +4,18 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <new>
 #include <xxhash.h>
 
 namespace semrover {
 
 struct Hash::State {
     XXH64_state_t* xxh = XXH64_createState();
+    State()
+    {
+        if (!xxh)
+            throw std::bad_alloc();
+    }
     ~State() { XXH64_freeState(xxh); }
 };
 

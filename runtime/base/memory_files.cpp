@@ -50,20 +50,28 @@ MemoryFolder::MemoryFolder()
     AllFiles& all = all_files();
     const std::lock_guard guard(all.mutex);
     path_ = std::string(kPrefix) + std::to_string(++all.folders);
+    take_keys();
 }
 
 MemoryFolder::MemoryFolder(Path path) : path_(std::move(path))
 {
+    take_keys();
     ++all_files().disk;
+}
+
+void MemoryFolder::take_keys()
+{
+    const std::string key = key_of(path_);
+    first_ = key + "/";
+    end_ = key + "0"; // the character after '/'
 }
 
 MemoryFolder::~MemoryFolder()
 {
     AllFiles& all = all_files();
-    const std::string key = key_of(path_);
     const std::lock_guard guard(all.mutex);
-    all.files.erase(all.files.lower_bound(key + "/"), all.files.lower_bound(key + "0")); // the character after '/'
-    all.disk -= is_ours(path_) ? 0 : 1;
+    all.files.erase(all.files.lower_bound(first_), all.files.lower_bound(end_));
+    all.disk -= first_.starts_with(kPrefix) ? 0 : 1;
 }
 
 Status MemoryFolder::add(std::string_view path, std::span<const std::byte> bytes)

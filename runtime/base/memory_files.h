@@ -27,7 +27,10 @@ class MemoryFolder {
     const Path& path() const { return path_; }
 
   private:
+    void take_keys();
+
     Path path_;
+    std::string first_, end_; // keys of its files: from the one to before the other
 };
 
 // for file.cpp: what such a folder has at a path

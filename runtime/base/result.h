@@ -3,6 +3,7 @@
 #pragma once
 
 #include <fmt/format.h>
+#include <new>
 #include <string>
 #include <tl/expected.hpp>
 #include <utility>
@@ -23,6 +24,8 @@ enum class ErrorCode : int {
     interrupted = 130,
 };
 
+inline constexpr char kNoHostMemory[] = "no host memory"; // short: a string holds it without allocating
+
 struct Error {
     ErrorCode code = ErrorCode::internal;
     std::string message; // one line: what, where, expected and found, what to do
@@ -36,6 +39,18 @@ template <typename... Args>
 [[nodiscard]] tl::unexpected<Error> fail(ErrorCode code, fmt::format_string<Args...> format, Args&&... args)
 {
     return tl::make_unexpected(Error{code, fmt::format(format, std::forward<Args>(args)...)});
+}
+
+// f(), which returns a Status or a Result; out_of_memory where it throws std::bad_alloc. For threads, which an
+// exception that leaves them ends with the process, and destructors.
+template <typename F>
+auto unless_memory_is_short(const F& f) -> decltype(f())
+{
+    try {
+        return f();
+    } catch (const std::bad_alloc&) {
+        return tl::make_unexpected(Error{ErrorCode::out_of_memory, kNoHostMemory});
+    }
 }
 
 // stops the program: a caller's bug, never a bad file or device

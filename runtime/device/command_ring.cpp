@@ -12,7 +12,7 @@ Result<std::unique_ptr<CommandRing>> CommandRing::create(Device& device, size_t 
     auto pool = vk_struct<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
     pool.queueFamilyIndex = device.queue_family();
     pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
-    SR_VK(device.vk().CreateCommandPool(device.handle(), &pool, device.vk().allocator(), &r->pool_));
+    SR_VK_MAKE(r->pool_, device.vk().CreateCommandPool(device.handle(), &pool, device.vk().allocator(), &r->pool_));
     r->commands_.resize(count);
     r->tickets_.assign(count, 0);
     auto allocate = vk_struct<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);

@@ -141,7 +141,10 @@ Status Device::create_instance(const DeviceOptions& options)
     info.pfnUserCallback = on_validation;
     const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
         vk_.GetInstanceProcAddr(instance_, "vkCreateDebugUtilsMessengerEXT"));
-    SR_VK(create(instance_, &info, vk_.allocator(), &messenger_));
+    if (const VkResult result = create(instance_, &info, vk_.allocator(), &messenger_); result != VK_SUCCESS) {
+        messenger_ = VK_NULL_HANDLE;
+        return tl::make_unexpected(vk_error(result, "vkCreateDebugUtilsMessengerEXT"));
+    }
     return {};
 }
 
@@ -208,7 +211,7 @@ Status Device::create_device(const DeviceOptions& options, bool matrices)
     info.pQueueCreateInfos = &queue;
     info.enabledExtensionCount = uint32_t(extensions.size());
     info.ppEnabledExtensionNames = extensions.data();
-    SR_VK(vk_.CreateDevice(physical_, &info, vk_.allocator(), &device_));
+    SR_VK_MAKE(device_, vk_.CreateDevice(physical_, &info, vk_.allocator(), &device_));
     SR_CHECK(vk_.load_device(device_));
     vk_.GetDeviceQueue(device_, queue_.family, 0, &queue_.queue);
     beside_ = queue_;
@@ -290,7 +293,7 @@ Status Device::make_objects()
     auto type = vk_struct<VkSemaphoreTypeCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO);
     type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
     auto semaphore = vk_struct<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO, &type);
-    SR_VK(vk_.CreateSemaphore(device_, &semaphore, vk_.allocator(), &timeline_));
+    SR_VK_MAKE(timeline_, vk_.CreateSemaphore(device_, &semaphore, vk_.allocator(), &timeline_));
     return {};
 }
 

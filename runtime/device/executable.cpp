@@ -104,7 +104,8 @@ Status Executable::make_sets()
     pool.maxSets = uint32_t(layouts.size());
     pool.poolSizeCount = 2;
     pool.pPoolSizes = sizes;
-    SR_VK(device_.vk().CreateDescriptorPool(device_.handle(), &pool, device_.vk().allocator(), &descriptors_));
+    SR_VK_MAKE(descriptors_,
+               device_.vk().CreateDescriptorPool(device_.handle(), &pool, device_.vk().allocator(), &descriptors_));
     auto allocate = vk_struct<VkDescriptorSetAllocateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO);
     allocate.descriptorPool = descriptors_;
     allocate.descriptorSetCount = uint32_t(layouts.size());
@@ -137,8 +138,9 @@ Status Executable::bind(const Pass& pass, VkDescriptorSet set)
             info.format = VK_FORMAT_R32G32B32A32_UINT;
             info.offset = offset;
             info.range = b.bytes / 16 * 16;
-            SR_VK(device_.vk().CreateBufferView(device_.handle(), &info, device_.vk().allocator(), &views[i]));
-            views_.push_back(views[i]);
+            VkBufferView& view = views_.emplace_back(); // which has a place before it is made
+            SR_VK_MAKE(view, device_.vk().CreateBufferView(device_.handle(), &info, device_.vk().allocator(), &view));
+            views[i] = view;
             writes[i].descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
             writes[i].pTexelBufferView = &views[i];
         } else {
@@ -158,7 +160,7 @@ Status Executable::make_queries()
     auto queries = vk_struct<VkQueryPoolCreateInfo>(VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO);
     queries.queryType = VK_QUERY_TYPE_TIMESTAMP;
     queries.queryCount = uint32_t(plan_.dispatches.size() * 2);
-    SR_VK(device_.vk().CreateQueryPool(device_.handle(), &queries, device_.vk().allocator(), &queries_));
+    SR_VK_MAKE(queries_, device_.vk().CreateQueryPool(device_.handle(), &queries, device_.vk().allocator(), &queries_));
     return {};
 }
 
@@ -166,9 +168,11 @@ Status Executable::record()
 {
     auto pool = vk_struct<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
     pool.queueFamilyIndex = device_.queue_family();
-    SR_VK(device_.vk().CreateCommandPool(device_.handle(), &pool, device_.vk().allocator(), &commands_pool_));
+    SR_VK_MAKE(commands_pool_,
+               device_.vk().CreateCommandPool(device_.handle(), &pool, device_.vk().allocator(), &commands_pool_));
     commands_.resize(plan_.submits);
-    if (commands_.empty())
+    recorded_ = commands_.empty();
+    if (recorded_)
         return {};
     auto allocate = vk_struct<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
     allocate.commandPool = commands_pool_;
@@ -176,6 +180,7 @@ Status Executable::record()
     SR_VK(device_.vk().AllocateCommandBuffers(device_.handle(), &allocate, commands_.data()));
     for (uint32_t i = 0; i < plan_.submits; ++i)
         SR_CHECK(record_submit(i));
+    recorded_ = true;
     return {};
 }
 
@@ -247,8 +252,10 @@ void Executable::record_dispatch(VkCommandBuffer commands, size_t index, bool ti
 Result<uint64_t> Executable::submit()
 {
     SR_CHECK(device_.check_cancelled());
-    if (measuring_ && runs_ > 0)
+    if (recorded_ && measuring_ && runs_ > 0)
         SR_CHECK(schedule_again());
+    if (!recorded_)
+        SR_CHECK(record_again());
     const auto begin = std::chrono::steady_clock::now();
     uint64_t ticket = device_.last_ticket();
     for (const VkCommandBuffer& commands : commands_) {
@@ -290,16 +297,23 @@ Status Executable::schedule_again()
         if (pass.options.max_flops > 0)
             seconds[i] = std::max(seconds[i], device_.costs().seconds(pass));
     }
-    if (autotuner_.running()) {
+    recorded_ = false; // what follows may fail
+    if (autotuner_.running())
         SR_CHECK(autotuner_.next(plan_, seconds, device_.limits(), device_.tuning()));
-        SR_CHECK(get_pipelines());
-    }
     stage::submits(plan_, device_.limits(), seconds);
+    measuring_ = autotuner_.running();
+    return {};
+}
+
+// after the plan has changed, or where that could not be done the last time
+Status Executable::record_again()
+{
+    SR_CHECK(device_.wait(device_.last_ticket()));
+    SR_CHECK(get_pipelines());
     device_.vk().DestroyCommandPool(device_.handle(), commands_pool_, device_.vk().allocator());
     device_.vk().DestroyQueryPool(device_.handle(), queries_, device_.vk().allocator());
-    commands_pool_ = VK_NULL_HANDLE; // what follows may fail
+    commands_pool_ = VK_NULL_HANDLE;
     queries_ = VK_NULL_HANDLE;
-    measuring_ = autotuner_.running();
     SR_CHECK(make_queries());
     return record();
 }

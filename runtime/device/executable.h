@@ -42,6 +42,7 @@ class Executable {
     Status bind(const Pass& pass, VkDescriptorSet set);
     Status make_queries();
     Status record();
+    Status record_again();
     Status record_submit(uint32_t index);
     void record_passes(VkCommandBuffer commands, uint32_t submit, bool timed) const;
     std::string label_of(const Pass& pass) const;
@@ -61,6 +62,7 @@ class Executable {
     std::vector<VkDescriptorSet> sets_;             // one per pass
     std::vector<VkBufferView> views_;
     std::vector<VkCommandBuffer> commands_; // one per submit
+    bool recorded_ = false;                 // the commands are those of the plan as it is
     bool measuring_ = false;                // the first run, or one of the autotuner: its passes are timed
     Autotuner autotuner_;
     double host_us_ = 0;

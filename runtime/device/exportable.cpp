@@ -64,7 +64,8 @@ Result<std::unique_ptr<ExportedSemaphore>> ExportedSemaphore::create(Device& dev
     auto exported = vk_struct<VkExportSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_EXPORT_SEMAPHORE_CREATE_INFO);
     exported.handleTypes = VK_EXTERNAL_SEMAPHORE_HANDLE_TYPE_OPAQUE_FD_BIT;
     auto info = vk_struct<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO, &exported);
-    SR_VK(device.vk().CreateSemaphore(device.handle(), &info, device.vk().allocator(), &s->semaphore_));
+    SR_VK_MAKE(s->semaphore_,
+               device.vk().CreateSemaphore(device.handle(), &info, device.vk().allocator(), &s->semaphore_));
     return s;
 }
 

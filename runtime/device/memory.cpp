@@ -61,7 +61,7 @@ Status Buffer::make_handle(MemoryKind kind)
         info.queueFamilyIndexCount = uint32_t(device_.families().size());
         info.pQueueFamilyIndices = device_.families().data();
     }
-    SR_VK(device_.vk().CreateBuffer(device_.handle(), &info, device_.vk().allocator(), &buffer_));
+    SR_VK_MAKE(buffer_, device_.vk().CreateBuffer(device_.handle(), &info, device_.vk().allocator(), &buffer_));
     dedicated_ = exportable_ && needs_dedicated_memory(device_);
     return {};
 }
@@ -111,7 +111,8 @@ Status Buffer::allocate(const VkMemoryRequirements& needs, uint32_t type, bool s
     }
     SR_VK(vk.BindBufferMemory(device_.handle(), buffer_, memory_, 0));
     if (seen)
-        SR_VK(vk.MapMemory(device_.handle(), memory_, 0, VK_WHOLE_SIZE, 0, reinterpret_cast<void**>(&mapped_)));
+        SR_VK_MAKE(mapped_,
+                   vk.MapMemory(device_.handle(), memory_, 0, VK_WHOLE_SIZE, 0, reinterpret_cast<void**>(&mapped_)));
     return {};
 }
 

@@ -108,7 +108,8 @@ Result<std::unique_ptr<PipelineStore>> PipelineStore::create(Device& device, std
     info.initialDataSize = kept.data.size();
     info.pInitialData = kept.data.data();
     store->reused_bytes_ = kept.data.size();
-    SR_VK(device.vk().CreatePipelineCache(device.handle(), &info, device.vk().allocator(), &store->cache_));
+    SR_VK_MAKE(store->cache_,
+               device.vk().CreatePipelineCache(device.handle(), &info, device.vk().allocator(), &store->cache_));
     return store;
 }
 
@@ -159,9 +160,11 @@ void PipelineStore::save()
 {
     if (cache_path_.empty())
         return;
-    const auto bytes = blob();
-    if (bytes && make_folder(fs::path(cache_path_).parent_path()))
-        (void)write_file_atomically(cache_path_, std::as_bytes(std::span(*bytes)));
+    (void)unless_memory_is_short([this]() -> Status {
+        SR_TRY(const std::vector<char> bytes, blob());
+        SR_CHECK(make_folder(fs::path(cache_path_).parent_path()));
+        return write_file_atomically(cache_path_, std::as_bytes(std::span(bytes)));
+    });
     saved_tuning_ = device_.tuning().size();
     saved_ = true;
 }
@@ -172,10 +175,11 @@ Result<std::vector<const Pipeline*>> PipelineStore::get(std::span<const Pass> pa
     std::set<Key> asked;
     for (const Pass& pass : passes) {
         const Key key{pass.variant, pass.constants};
-        if (pipelines_.contains(key) || !asked.insert(key).second)
+        Pipeline& kept = pipelines_[key]; // which has a place before it is made
+        if (kept.pipeline || !asked.insert(key).second)
             continue;
         SR_TRY(const Shader* of_variant, shader(*pass.variant));
-        missing.push_back({&pass, of_variant});
+        missing.push_back({&pass, of_variant, &kept});
     }
     SR_CHECK(compile(missing));
     std::vector<const Pipeline*> found;
@@ -192,7 +196,7 @@ Status PipelineStore::compile(std::span<Missing> missing)
         const size_t i = next++;
         if (i >= missing.size())
             return false;
-        missing[i].status = make(missing[i]);
+        missing[i].status = unless_memory_is_short([&] { return make(missing[i]); });
         return true;
     };
     const size_t most = device_.vk().allocator() ? 1 : std::max(std::thread::hardware_concurrency(), 1u);
@@ -204,6 +208,7 @@ Status PipelineStore::compile(std::span<Missing> missing)
                 }
             });
     } catch (const std::system_error&) { // no more threads: those that are there do it
+    } catch (const std::bad_alloc&) {
     }
     auto begin = std::chrono::steady_clock::now();
     const auto save = [&] {
@@ -219,9 +224,7 @@ Status PipelineStore::compile(std::span<Missing> missing)
     if (!missing.empty()) // what the other threads made last, or all of it
         save();
     for (Missing& m : missing)
-        if (m.made.pipeline)
-            pipelines_[{m.pass->variant, m.pass->constants}] = m.made;
-        else if (status)
+        if (status && !m.made->pipeline)
             status = std::move(m.status);
     return status;
 }
@@ -241,12 +244,13 @@ Result<const Shader*> PipelineStore::shader(const KernelVariant& variant)
 {
     if (const auto at = shaders_.find(&variant); at != shaders_.end())
         return &at->second;
-    Shader made;
-    if (Status status = make_shader(variant, made); !status) {
-        destroy(made);
-        return tl::make_unexpected(std::move(status).error());
-    }
-    return &(shaders_[&variant] = made);
+    Shader& made = shaders_[&variant]; // which has a place before it is made
+    Status status = unless_memory_is_short([&] { return make_shader(variant, made); });
+    if (status)
+        return &made;
+    destroy(made);
+    shaders_.erase(&variant);
+    return tl::make_unexpected(std::move(status).error());
 }
 
 void PipelineStore::destroy(const Shader& s)
@@ -267,18 +271,21 @@ Status PipelineStore::make_shader(const KernelVariant& variant, Shader& out)
     auto set = vk_struct<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
     set.bindingCount = uint32_t(bindings.size());
     set.pBindings = bindings.data();
-    SR_VK(device_.vk().CreateDescriptorSetLayout(device_.handle(), &set, device_.vk().allocator(), &out.set_layout));
+    SR_VK_MAKE(out.set_layout, device_.vk().CreateDescriptorSetLayout(device_.handle(), &set, device_.vk().allocator(),
+                                                                      &out.set_layout));
     const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, variant.push_bytes};
     auto layout = vk_struct<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
     layout.setLayoutCount = 1;
     layout.pSetLayouts = &out.set_layout;
     layout.pushConstantRangeCount = variant.push_bytes ? 1 : 0;
     layout.pPushConstantRanges = &range;
-    SR_VK(device_.vk().CreatePipelineLayout(device_.handle(), &layout, device_.vk().allocator(), &out.layout));
+    SR_VK_MAKE(out.layout,
+               device_.vk().CreatePipelineLayout(device_.handle(), &layout, device_.vk().allocator(), &out.layout));
     auto code = vk_struct<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
     code.codeSize = variant.code.size_bytes();
     code.pCode = variant.code.data();
-    SR_VK(device_.vk().CreateShaderModule(device_.handle(), &code, device_.vk().allocator(), &out.module));
+    SR_VK_MAKE(out.module,
+               device_.vk().CreateShaderModule(device_.handle(), &code, device_.vk().allocator(), &out.module));
     return {};
 }
 
@@ -314,14 +321,19 @@ Status PipelineStore::make(Missing& m) const
     robust.storageBuffers = robust.uniformBuffers = VK_PIPELINE_ROBUSTNESS_BUFFER_BEHAVIOR_ROBUST_BUFFER_ACCESS_EXT;
     if (device_.pipeline_robustness())
         info.pNext = &robust;
-    m.made = {VK_NULL_HANDLE, m.shader->layout, m.shader->set_layout, nullptr};
-    SR_VK(device_.vk().CreateComputePipelines(device_.handle(), cache_, 1, &info, device_.vk().allocator(),
-                                              &m.made.pipeline));
-    name_object(device_.vk(), device_.handle(), VK_OBJECT_TYPE_PIPELINE, reinterpret_cast<uint64_t>(m.made.pipeline),
+    *m.made = {VK_NULL_HANDLE, m.shader->layout, m.shader->set_layout, nullptr};
+    const VkResult result = device_.vk().CreateComputePipelines(device_.handle(), cache_, 1, &info,
+                                                                device_.vk().allocator(), &m.made->pipeline);
+    if (result != VK_SUCCESS) {
+        m.made->pipeline = VK_NULL_HANDLE;
+        const Error error = vk_error(result, "vkCreateComputePipelines");
+        return fail(error.code, "{}: {}", m.pass->name(), error.message);
+    }
+    name_object(device_.vk(), device_.handle(), VK_OBJECT_TYPE_PIPELINE, reinterpret_cast<uint64_t>(m.made->pipeline),
                 m.pass->name());
     if (device_.pipeline_statistics()) {
-        SR_TRY(auto statistics, statistics_of(device_.vk(), device_.handle(), m.made.pipeline));
-        m.made.statistics = std::make_shared<const std::vector<Statistic>>(std::move(statistics));
+        SR_TRY(auto statistics, statistics_of(device_.vk(), device_.handle(), m.made->pipeline));
+        m.made->statistics = std::make_shared<const std::vector<Statistic>>(std::move(statistics));
     }
     return {};
 }

@@ -58,7 +58,7 @@ class PipelineStore {
     struct Missing {
         const Pass* pass;
         const Shader* shader;
-        Pipeline made = {};
+        Pipeline* made; // where the store keeps it
         Status status = {};
     };
     Status compile(std::span<Missing> missing);

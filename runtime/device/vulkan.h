@@ -9,6 +9,7 @@
 namespace semrover {
 
 const char* vk_result_name(VkResult result);
+// call: its name, or the text of one through VulkanCalls
 Error vk_error(VkResult result, const char* call);
 
 // a structure of Vulkan's: its type, what follows it, and zeros
@@ -27,4 +28,13 @@ T vk_struct(VkStructureType type, void* next = nullptr)
     do {                                                                                                               \
         if (const VkResult sr_vk_result = (call); sr_vk_result != VK_SUCCESS)                                          \
             return tl::make_unexpected(::semrover::vk_error(sr_vk_result, #call));                                     \
+    } while (0)
+
+// For calls that make `handle`, which is undefined after one that failed: destructors must not meet it.
+#define SR_VK_MAKE(handle, call)                                                                                       \
+    do {                                                                                                               \
+        if (const VkResult sr_vk_result = (call); sr_vk_result != VK_SUCCESS) {                                        \
+            (handle) = {};                                                                                             \
+            return tl::make_unexpected(::semrover::vk_error(sr_vk_result, #call));                                     \
+        }                                                                                                              \
     } while (0)

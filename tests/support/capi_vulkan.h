@@ -33,7 +33,7 @@
     } while (0)
 
 /* the last error has this text in it */
-static int says(const sr_context* context, const char* text)
+static inline int says(const sr_context* context, const char* text)
 {
     char message[512];
     const size_t length = sr_last_error(context, message, sizeof message);

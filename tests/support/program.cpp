@@ -27,8 +27,8 @@ ProgramResult semrover_program(const std::string& arguments)
 ProgramResult semrover_with_lost_devices(int devices, int submits, const std::string& arguments)
 {
     const std::string environment = "env VK_ADD_LAYER_PATH=" SEMROVER_LAYERS
-                                    " VK_INSTANCE_LAYERS=VK_LAYER_SEMROVER_losing_gpu LOSING_GPU_DEVICES=" +
-                                    std::to_string(devices) + " LOSING_GPU_SUBMITS=" + std::to_string(submits) + " ";
+                                    " VK_INSTANCE_LAYERS=VK_LAYER_SEMROVER_failing_gpu FAILING_GPU_DEVICES=" +
+                                    std::to_string(devices) + " FAILING_GPU_AT=" + std::to_string(submits + 1) + " ";
     return run_program_line(environment + SEMROVER_BINARY, arguments);
 }
 

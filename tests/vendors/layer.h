@@ -93,10 +93,11 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL instance_proc(VkInstance instance, cons
         return any(instance_proc);
     if (asked == "vkGetDeviceProcAddr")
         return any(device_proc);
+    if (const PFN_vkVoidFunction function = ours(asked))
+        return function;
     if (asked == "vkCreateInstance")
         return any(create_instance);
-    const PFN_vkVoidFunction function = ours(asked);
-    return function || !driver.instance_proc ? function : driver.instance_proc(instance, name);
+    return driver.instance_proc ? driver.instance_proc(instance, name) : nullptr;
 }
 
 } // namespace
