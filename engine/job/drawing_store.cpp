@@ -134,12 +134,12 @@ Status make_float_images(const Path& folder, uint32_t number, const SplatImage& 
 
 Status DrawingStore::check(const Path& folder, const CameraPath& path, bool replace)
 {
-    if (replace || fs::exists(folder / "run.json")) // whether it may go on is known by its settings
+    if (replace || is_there(folder / "run.json")) // whether it may go on is known by its settings
         return {};
     std::vector<std::string> names = picture_folders(cameras_of(path));
     std::ranges::copy(single_files(), std::back_inserter(names));
     for (const std::string& name : names)
-        if (fs::exists(folder / name))
+        if (is_there(folder / name))
             return fail(ErrorCode::usage, "{} exists; `replace` replaces what is there", quote_path(folder / name));
     return {};
 }

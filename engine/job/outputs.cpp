@@ -10,7 +10,7 @@ namespace semrover {
 
 Status check_writable(const Path& path, bool replace)
 {
-    if (std::filesystem::exists(path) && !replace)
+    if (is_there(path) && !replace)
         return fail(ErrorCode::usage, "{} exists; `replace` replaces it", quote_path(path));
     return AtomicFile::create(path).map([](const AtomicFile&) {});
 }

@@ -119,7 +119,7 @@ Result<RunFolder> RunFolder::open(const Path& folder, const Json& settings, bool
     SR_CHECK(make_folder(folder));
     SR_CHECK(run.refuse_links());
     SR_CHECK(run.lock());
-    if (fs::exists(folder / "run.json") && !restart) {
+    if (is_there(folder / "run.json") && !restart) {
         SR_TRY(const Json before, read_summary(folder / "run.json"));
         const bool finished = before.value("state", Json()) == "finished";
         if (before.value("settings", Json()) != settings)
@@ -193,7 +193,7 @@ Status RunFolder::start()
 Status RunFolder::read_journal()
 {
     const Path path = path_ / "journal.jsonl";
-    if (!fs::exists(path))
+    if (!is_there(path))
         return {};
     SR_TRY(const std::string text, read_text_file(path, kMaxJournalBytes));
     size_t at = 0;

@@ -63,7 +63,7 @@ Status check_output(const ConvertSceneOptions& o, SceneFormat format, const Glob
         std::error_code ignored;
         if (fs::equivalent(o.in, file, ignored))
             return fail(ErrorCode::usage, "IN and OUT are the same, {}", quote_path(file));
-        if (fs::exists(file) && !globals.yes)
+        if (is_there(file) && !globals.yes)
             return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(file));
         SR_CHECK(AtomicFile::create(file).map([](const AtomicFile&) {}));
     }

@@ -44,7 +44,7 @@ double seconds_now()
 
 Result<uint64_t> hash_input(const Path& path)
 {
-    return fs::is_directory(path) ? hash_folder(path) : hash_file(path);
+    return is_folder(path) ? hash_folder(path) : hash_file(path);
 }
 
 } // namespace
@@ -143,7 +143,7 @@ bool GridRun::finished_before()
         return false;
     finished_ = finished_results(folder(), settings_, o_.output);
     for (const Path& path : written_files(!objects_->empty()))
-        if (!fs::exists(path))
+        if (!is_there(path))
             finished_.reset();
     return finished_.has_value();
 }
@@ -228,7 +228,7 @@ Status TilesRun::check() const
     // of a finished run, the settings say whether it is this one
     if (TileFolder::is_one(o_.output) && !globals_.yes && !finished_results(folder(), Json()))
         return fail(ErrorCode::usage, "{} exists; -y replaces it", quote(o_.output));
-    if (fs::exists(o_.output) && !fs::is_directory(o_.output))
+    if (is_there(o_.output) && !is_folder(o_.output))
         return fail(ErrorCode::bad_input, "{} is a file; --along writes a folder of tiles", quote(o_.output));
     return {};
 }
@@ -247,7 +247,7 @@ Status TilesRun::read()
     lens.matters = false; // where the camera is
     SR_TRY(const CameraPath path, read_camera_path(o_.along, lens, placement_));
     track_ = ground_track(path);
-    if (fs::is_directory(o_.grid)) {
+    if (is_folder(o_.grid)) {
         SR_TRY(const TileFolder tiles, TileFolder::open(o_.grid));
         metadata_ = tiles.metadata();
         SR_TRY(labels_, labels_of_folder(o_.grid));

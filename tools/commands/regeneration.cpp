@@ -46,7 +46,7 @@ Path undo_of(const Path& output)
 // a seed of several that an earlier start of the same command has finished; its results
 std::optional<Json> finished_before(const Path& output, const Json& settings)
 {
-    return fs::exists(undo_of(output)) ? finished_results(run_folder_of(output), settings, output) : std::nullopt;
+    return is_there(undo_of(output)) ? finished_results(run_folder_of(output), settings, output) : std::nullopt;
 }
 
 // the grid with its objects, then what takes it back
@@ -156,7 +156,7 @@ Result<Json> run_to_end(SeedRun run, const Path& output, bool several, bool warn
     const Path folder = run_folder_of(output);
     if (const auto results = finished_before(output, run.settings()); results && !globals.yes && several)
         return *results;
-    if (fs::exists(output) && !globals.yes)
+    if (is_there(output) && !globals.yes)
         return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(output));
     SR_CHECK(run.open(callbacks));
     SR_CHECK(run.keep_in(folder, globals.yes));
@@ -230,7 +230,7 @@ Status check_outputs(const Path& input, const RegenerationArguments& o, const Gl
         if (o.seeds.size() < 2 || !finished_before(output, Json()))
             for (const Path& path : {output, objects_beside(output)})
                 SR_CHECK(check_writable(path, globals.yes));
-        if (!fs::exists(run_folder_of(output))) // the record is not of a run of ours that goes on
+        if (!is_there(run_folder_of(output))) // the record is not of a run of ours that goes on
             SR_CHECK(check_writable(undo_of(output), globals.yes));
     }
     return {};

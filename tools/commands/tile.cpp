@@ -34,13 +34,13 @@ Status cut(const TileArguments& o, const Globals& globals)
 {
     namespace fs = std::filesystem;
     std::error_code error;
-    if (fs::exists(o.output) && !fs::is_directory(o.output))
+    if (is_there(o.output) && !is_folder(o.output))
         return fail(ErrorCode::usage, "'{}' is a file; tiles are written to a folder", o.output);
-    if (fs::exists(o.output) && !fs::is_empty(o.output, error))
+    if (is_there(o.output) && !fs::is_empty(o.output, error))
         return fail(ErrorCode::usage, "'{}' is not empty: tiles of two scenes must not mix", o.output);
     SR_TRY(const VoxelGrid grid, read_grid(o.input));
     SR_TRY(const int32_t edge, tile_cells_of(o.tile_size, grid.voxel_size));
-    const bool existed = fs::exists(o.output);
+    const bool existed = is_there(o.output);
     if (const Status written = write_tiles(o.output, grid, edge); !written) {
         if (!existed)
             fs::remove_all(o.output, error);

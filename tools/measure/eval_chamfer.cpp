@@ -190,7 +190,7 @@ Status eval_chamfer(const EvalChamferArguments& o, const Globals& globals)
 {
     if (!o.grid.empty() && !o.sweep.empty())
         return fail(ErrorCode::usage, "--sweep makes its own grids; give either POINTS or --sweep");
-    if (!o.csv.empty() && std::filesystem::exists(o.csv) && !globals.yes)
+    if (!o.csv.empty() && is_there(o.csv) && !globals.yes)
         return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(o.csv));
     if (!o.sweep.empty()) {
         SR_CHECK(points_of_sweep(o.sweep));

@@ -40,7 +40,7 @@ LabelSource source_of(const std::string& name)
 Status check_outputs(const VoxelizeArguments& o, const Globals& globals)
 {
     for (const std::string& path : {o.output, o.ply})
-        if (!path.empty() && std::filesystem::exists(path) && !globals.yes)
+        if (!path.empty() && is_there(path) && !globals.yes)
             return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(path));
     return {};
 }
