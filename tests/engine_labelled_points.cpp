@@ -5,6 +5,7 @@
 #include "engine/format/ply_reader.h"
 #include "engine/scene/palette.h"
 #include "runtime/base/dtype.h"
+#include "runtime/base/memory_files.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch_folder.h"
 #include "tools/dataset/object_boxes.h"
@@ -51,6 +52,16 @@ TEST(LabelledPoints, a_cells_label_is_that_of_most_points)
     const auto finer = read_labelled_points(path, o);
     ASSERT_TRUE(finer) << finer.error().message;
     EXPECT_EQ(finer->grid.cells[0], (Cell{38, 0, 0})); // 9.5
+}
+
+TEST(LabelledPoints, a_file_may_be_in_memory)
+{
+    const std::string text = ply(std::string(kXyz) + "property int label\n", {"0.1 0.1 0.1 8"});
+    MemoryFolder folder;
+    ASSERT_TRUE(folder.add("p.ply", std::as_bytes(std::span(text))));
+    const auto out = read_labelled_points(folder.path() / "p.ply", {});
+    ASSERT_TRUE(out) << out.error().message;
+    EXPECT_EQ(out->grid.labels, std::vector<uint8_t>{8});
 }
 
 TEST(LabelledPoints, any_order_of_properties_any_of_the_names_and_both_byte_orders)

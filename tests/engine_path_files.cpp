@@ -73,6 +73,13 @@ void expect_looking_along_x(const CameraPath& path, size_t frame, const Point3& 
     EXPECT_NEAR(pixel->y, k.cy - k.fy * 0.125, 1e-3);
 }
 
+TEST(PathFiles, pandasets_poses_are_an_array)
+{
+    const ScratchFolder folder;
+    const auto path = read_pandaset(folder.put("poses.json", R"({"position": {}, "heading": {}})"), kView);
+    EXPECT_TRUE(says(path, "expected an array of poses, found object"));
+}
+
 class DataSetPaths : public testing::Test {
   protected:
     CameraPath read(const char* name, std::string_view text)

@@ -29,6 +29,15 @@ namespace fs = std::filesystem;
 
 const Json kSettings = {{"command", "test"}, {"seed", 1}};
 
+TEST(engine_run_folder, a_name_that_is_too_long_is_an_error_and_no_exception)
+{
+    const ScratchFolder folder;
+    const fs::path name = folder / std::string(300, 'x');
+    EXPECT_TRUE(says(check_writable(name, false), "File name too long"));
+    EXPECT_TRUE(says(RunFolder::open(name, kSettings, false), "File name too long"));
+    EXPECT_TRUE(says(open_run(name, kSettings, true), "File name too long"));
+}
+
 TEST(engine_run_folder, a_link_is_refused_by_name_and_its_target_stays)
 {
     for (const char* name : {"journal.jsonl", "lock", "run.json", "regions", "frames", "frames/front"})

@@ -235,11 +235,10 @@ Result<SceneGrid> read_points(const Path& path, const SceneGridOptions& o, Hande
         if (vertices->rows > kMaxPoints)
             return fail(ErrorCode::bad_input, "{}: {} vertices, at most {} are supported", where, vertices->rows,
                         kMaxPoints);
-        const uint64_t file_bytes = std::filesystem::file_size(path),
-                       most = ((256u << 20) + 6 * file_bytes) / kPointBytes;
+        const uint64_t most = ((256u << 20) + 6 * file.file_bytes) / kPointBytes;
         if (vertices->rows > most) // in 16 bytes, as most programs write them, or more: never
             return fail(ErrorCode::bad_input, "{}: {} vertices in {} bytes, at most {} are supported", where,
-                        vertices->rows, file_bytes, most);
+                        vertices->rows, file.file_bytes, most);
         SR_CHECK(take_points(*vertices, says_own_labels(file.comments), o, handedness, where, points, out));
     }
     std::vector<size_t> order(points.cells.size());

@@ -313,7 +313,7 @@ Result<PlyFile> read_ply(const Path& path)
     const std::string_view bytes(reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size());
     SR_TRY(PlyHeader header, parse_ply_header(bytes, where));
     BodyReader body(bytes, header, where);
-    PlyFile ply{std::move(header.comments), {}};
+    PlyFile ply{std::move(header.comments), {}, bytes.size()};
     for (PlyLayout& layout : header.elements) {
         PlyElement element{std::move(layout.name), layout.rows, {}};
         for (size_t i = 0; i < layout.columns.size(); ++i) {

@@ -85,6 +85,7 @@ struct PlyElement {
 struct PlyFile {
     std::vector<std::string> comments;
     std::vector<PlyElement> elements;
+    uint64_t file_bytes = 0;
 
     const PlyElement* find(std::string_view element) const;
 };

@@ -47,9 +47,11 @@ Result<std::shared_ptr<const ShardSet>> ShardSet::open(const Path& folder)
 {
     OpenSets& all = open_sets();
     const std::lock_guard guard(all.mutex);
-    std::weak_ptr<const ShardSet>& known = all.sets[key_path(folder)];
-    if (std::shared_ptr<const ShardSet> set = known.lock())
-        return set;
+    std::erase_if(all.sets, [](const auto& entry) { return entry.second.expired(); });
+    const Path key = key_path(folder);
+    if (const auto known = all.sets.find(key); known != all.sets.end())
+        if (std::shared_ptr<const ShardSet> set = known->second.lock())
+            return set;
     SR_TRY(ShardIndex index, read_shard_index(folder));
     const auto set = std::make_shared<ShardSet>(folder, std::move(index));
     for (size_t i = 0; i < set->index_.shards.size(); ++i) {
@@ -62,7 +64,7 @@ Result<std::shared_ptr<const ShardSet>> ShardSet::open(const Path& folder)
         for (const ShardMember& member : shard.members)
             SR_CHECK(set->folder_.add(member.path, set->bytes(i, member)));
     }
-    known = set;
+    all.sets[key] = set;
     return std::shared_ptr<const ShardSet>(set);
 }
 

@@ -13,3 +13,4 @@ cd "$folder"
 unset PYTHONPATH
 "$folder/venv/bin/python" -c 'import semrover, sys; assert semrover.__file__.startswith(sys.prefix), semrover.__file__'
 "$folder/venv/bin/python" "$here/test_package.py"
+"$folder/venv/bin/python" "$here/test_arrays.py"

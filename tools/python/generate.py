@@ -14,8 +14,10 @@ OUTPUT = pathlib.Path(__file__).parent / "semrover" / "_abi.py"
 HEAD = '''# SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
 # Written by tools/python/generate.py of the C headers; not to be edited.
-from ctypes import (CFUNCTYPE, POINTER, Structure, c_char, c_char_p, c_double, c_float, c_int32, c_int64, c_size_t,
-                    c_uint8, c_uint16, c_uint32, c_uint64, c_void_p)
+from ctypes import (CFUNCTYPE, POINTER, c_char, c_char_p, c_double, c_float, c_int32, c_int64, c_size_t, c_uint8, c_uint16,
+                    c_uint32, c_uint64, c_void_p)
+
+from ._numbers import Structure
 '''
 SCALARS = {"int32_t": "c_int32", "int64_t": "c_int64", "uint8_t": "c_uint8", "uint16_t": "c_uint16",
            "uint32_t": "c_uint32", "uint64_t": "c_uint64", "size_t": "c_size_t", "float": "c_float",

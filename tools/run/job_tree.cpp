@@ -8,6 +8,9 @@
 #include <algorithm>
 #include <cmath>
 
+// note: its assertions are about what files say ("[{"), and the checks behind them give the error
+#undef NDEBUG
+#define TOML_ASSERT(condition) static_cast<void>(0)
 #define TOML_EXCEPTIONS 0
 #define TOML_HEADER_ONLY 1
 #include <toml++/toml.h>

@@ -132,6 +132,8 @@ Result<CameraPath> read_pandaset(const Path& path, const PathLens& lens)
 {
     const std::string name = quote_path(path);
     SR_TRY(const Json file, read_json(path));
+    if (!file.is_array())
+        return fail(ErrorCode::bad_input, "{}: expected an array of poses, found {}", name, file.type_name());
     const Path folder = path.parent_path();
     const bool calibrated = is_file(folder / "intrinsics.json"), lidar = folder.filename() == "lidar";
     CameraPath cameras;

@@ -70,7 +70,7 @@ Result<std::vector<Path>> find_cases(const std::vector<std::string>& arguments)
         }
         std::vector<Path> inside;
         for (const auto& entry : fs::directory_iterator(argument, error))
-            if (fs::exists(entry.path() / "case.json"))
+            if (is_there(entry.path() / "case.json"))
                 inside.push_back(entry.path());
         if (inside.empty())
             return fail(ErrorCode::bad_input,

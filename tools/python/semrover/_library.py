@@ -8,6 +8,7 @@ import threading
 import weakref
 
 from . import _abi
+from ._numbers import checked
 
 
 class Error(RuntimeError):
@@ -77,7 +78,7 @@ def _open():
                 made = getattr(library, function)
             except AttributeError:
                 raise ImportError(f"{name} has no {function}: it is older than this package") from None
-            made.restype, made.argtypes = result, parameters
+            made.restype, made.argtypes = result, [checked(p) for p in parameters]
         if library.sr_abi_version() != _abi.SR_ABI_VERSION:
             raise ImportError(f"{name} has version {library.sr_abi_version()} of the interface, this package "
                               f"{_abi.SR_ABI_VERSION}")
