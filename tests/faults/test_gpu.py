@@ -24,7 +24,7 @@ from small_job import write_labels  # noqa: E402
 
 SEMROVER, HOST, RENDERER = os.environ["SEMROVER"], os.environ["GPU_HOST"], os.environ["RENDERER"]
 MODEL = str(SOURCES / "tests/golden/sampling_ddpm/model")
-MOST_SECONDS = 120  # of a run that takes two; a machine may be busy
+MOST_SECONDS = 120  # of a run that takes two: a machine may be busy
 COLD_SECONDS = 600  # of one that compiles
 
 HOST_MEMORY, DEVICE_MEMORY, INITIALIZATION, LOST, MAPPING, TOO_MANY, TIMEOUT = -1, -2, -3, -4, -5, -10, 2
