@@ -16,7 +16,7 @@
 
 enum { MOST_SIZE = 96, FRAME = 32, LINES = 60, LENGTH = 40 };
 
-struct host {
+struct session {
     sr_context* context;
     sr_world* world;
     sr_renderer* renderer;
@@ -72,7 +72,7 @@ static struct usage usage_of(sr_context* context)
     return u;
 }
 
-static void end(struct host* h)
+static void end(struct session* h)
 {
     sr_renderer_destroy(h->renderer);
     sr_world_destroy(h->world);
@@ -80,7 +80,7 @@ static void end(struct host* h)
     memset(h, 0, sizeof *h);
 }
 
-static sr_status begin(struct host* h, const char* model, const char* weights)
+static sr_status begin(struct session* h, const char* model, const char* weights)
 {
     sr_context_desc context = {0};
     sr_world_desc world = street_world();
@@ -98,7 +98,7 @@ static sr_status begin(struct host* h, const char* model, const char* weights)
     return status == SR_OK ? create_renderer(h->context, weights, &renderer, &h->renderer) : status;
 }
 
-static sr_status fly_to(struct host* h, double x)
+static sr_status fly_to(struct session* h, double x)
 {
     const double position[3] = {x, 0, 1.5}, forward[3] = {1, 0, 0};
     uint32_t done = 0;
@@ -106,7 +106,7 @@ static sr_status fly_to(struct host* h, double x)
     return status == SR_OK ? sr_world_step(h->world, 4000, &done) : status;
 }
 
-static sr_status edit(struct host* h, double x)
+static sr_status edit(struct session* h, double x)
 {
     sr_cell cell = {0};
     cell.i = (int32_t)(x / 0.6);
@@ -116,7 +116,7 @@ static sr_status edit(struct host* h, double x)
     return sr_world_edit(h->world, &cell, 1);
 }
 
-static sr_status draw(struct host* h, double x)
+static sr_status draw(struct session* h, double x)
 {
     static float color[MOST_SIZE * MOST_SIZE * 4];
     sr_draw_desc d = camera_at(x, 8 + random_below(MOST_SIZE - 8), 8 + random_below(MOST_SIZE - 8));
@@ -124,7 +124,7 @@ static sr_status draw(struct host* h, double x)
     return sr_world_draw(h->world, &d);
 }
 
-static sr_status refine(struct host* h, double x)
+static sr_status refine(struct session* h, double x)
 {
     static uint8_t pixels[FRAME * FRAME * 4];
     sr_frame_desc frame = {0};
@@ -143,7 +143,7 @@ static sr_status refine(struct host* h, double x)
 }
 
 /* a moment of the flight: there and back again */
-static sr_status moment(struct host* h, struct counts* counts, unsigned at)
+static sr_status moment(struct session* h, struct counts* counts, unsigned at)
 {
     const double way = fmod(0.2 * at, 2 * LENGTH), x = way < LENGTH ? way : 2 * LENGTH - way;
     sr_status status = fly_to(h, x);
@@ -158,7 +158,8 @@ static sr_status moment(struct host* h, struct counts* counts, unsigned at)
 
 static void print(double since, const struct usage* u, const struct counts* c)
 {
-    printf("%7.0f s %7.1f MiB %3u files %3u threads %6.1f MiB on the device %7u pictures %6u edits %5u frames %4u losses\n",
+    printf("%7.0f s %7.1f MiB %3u files %3u threads %6.1f MiB on the device %7u pictures %6u edits %5u frames %4u "
+           "losses\n",
            since, u->resident, u->files, u->threads, u->device, c->pictures, c->edits, c->frames, c->losses);
     fflush(stdout);
 }
@@ -178,7 +179,7 @@ static struct usage most(const struct usage* lines, int from, int to)
 
 int main(int argc, char** argv)
 {
-    struct host host = {0};
+    struct session host = {0};
     struct counts counts = {0};
     struct usage lines[LINES], early, late;
     unsigned at = 0;
