@@ -164,18 +164,21 @@ TEST_F(CliAlong, a_tile_that_is_missing_or_damaged_is_made_again)
         if (damage)
             folder_.put(std::string(output) + "/" + name, "damaged");
     };
-    for (const char* output : {"part", "whole"}) // one that goes on, one that is finished
-        for (const auto& [name, hash] : bytes(output))
-            for (const bool damage : {false, true}) {
-                for (const char* end : {"", ".run"}) {
-                    std::filesystem::remove_all(folder_ / (std::string("out") + end));
-                    std::filesystem::copy(folder_ / (std::string(output) + end), folder_ / (std::string("out") + end),
-                                          std::filesystem::copy_options::recursive);
-                }
-                spoil("out", name, damage);
-                run(line("out"));
-                EXPECT_EQ(bytes("whole"), bytes("out")) << output << " " << name << " " << damage;
+    for (const char* output : {"part", "whole"}) { // one that goes on, one that is finished
+        size_t number = 0;
+        for (const auto& [name, hash] : bytes(output)) {
+            if (number++ % 3 != 1) // wanted ones, and those beside them
+                continue;
+            for (const char* end : {"", ".run"}) {
+                std::filesystem::remove_all(folder_ / (std::string("out") + end));
+                std::filesystem::copy(folder_ / (std::string(output) + end), folder_ / (std::string("out") + end),
+                                      std::filesystem::copy_options::recursive);
             }
+            spoil("out", name, number % 2);
+            run(line("out"));
+            EXPECT_EQ(bytes("whole"), bytes("out")) << output << " " << name << " " << number % 2;
+        }
+    }
 }
 
 // killed, or the disk was full, between the index and the run's end

@@ -22,7 +22,7 @@ class KeptInputs {
 
     void file(const fs::path& name, const std::string& bytes) const
     {
-        if (!folder_ || bytes.size() > kMostBytes)
+        if (!folder_ || bytes.size() > kMostBytes || name.string().size() > 100)
             return;
         const fs::path kept =
             fs::path(folder_) / (std::to_string(std::hash<std::string>()(bytes)) + "-" + name.string());
