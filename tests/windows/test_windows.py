@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is built for Windows, under Wine, beside the same of this machine, on the same driver: test_windows.py
 LINUX_BUILD WINDOWS_BUILD [--library]. With --library nothing of the programs."""
-import importlib.util
+import importlib
 import os
 import pathlib
 import re
@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import types
 import unittest
 
 SOURCES = pathlib.Path(__file__).resolve().parents[2]
@@ -70,9 +71,10 @@ class Library(WithFolder):
         self.assertLessEqual({name.lower() for name in re.findall(r"DLL Name: (\S+)", dump)}, DLLS)
 
     def test_structures_are_those_of_linux(self):
-        spec = importlib.util.spec_from_file_location("abi", SOURCES / "tools/python/semrover/_abi.py")
-        abi = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(abi)
+        package = types.ModuleType("package")  # without what its __init__ imports
+        package.__path__ = [str(SOURCES / "tools/python/semrover")]
+        sys.modules["package"] = package
+        abi = importlib.import_module("package._abi")
         source = self.folder / "sizes.c"
         source.write_text(structures.checks(abi))
         run_well([MINGW + "gcc-posix", "-std=c11", "-I", SOURCES / "engine", "-c", source, "-o",
