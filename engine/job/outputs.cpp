@@ -9,6 +9,20 @@
 
 namespace semrover {
 
+namespace {
+
+// the run.json of a run in that state, with these settings (null: any)
+std::optional<Json> run_in(const Path& folder, std::string_view state, const Json& settings)
+{
+    const auto run = read_json(folder / "run.json");
+    if (!run || !run->is_object() || run->value("state", Json()) != state ||
+        (!settings.is_null() && run->value("settings", Json()) != settings))
+        return std::nullopt;
+    return *run;
+}
+
+} // namespace
+
 Status check_writable(const Path& path, bool replace)
 {
     SR_CHECK(refuse_existing(path, replace));
@@ -17,9 +31,8 @@ Status check_writable(const Path& path, bool replace)
 
 std::optional<Json> finished_results(const Path& folder, const Json& settings)
 {
-    const auto run = read_json(folder / "run.json");
-    if (!run || !run->is_object() || run->value("state", Json()) != "finished" ||
-        (!settings.is_null() && run->value("settings", Json()) != settings))
+    const auto run = run_in(folder, "finished", settings);
+    if (!run)
         return std::nullopt;
     const Json results = run->value("results", Json::object());
     return results.is_object() ? std::optional(results) : std::nullopt;
@@ -38,9 +51,7 @@ std::optional<Json> finished_results(const Path& folder, const Json& settings, c
 
 bool goes_on(const Path& folder, const Json& settings)
 {
-    const auto run = read_json(folder / "run.json");
-    return run && run->is_object() && run->value("settings", Json()) == settings &&
-           run->value("state", Json()) == "running";
+    return run_in(folder, "running", settings).has_value();
 }
 
 Status write_record_of(const CameraPath& path, double depth_unit, const Path& folder, const JobCallbacks& callbacks)

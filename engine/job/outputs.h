@@ -17,7 +17,8 @@ std::optional<Json> finished_results(const Path& folder, const Json& settings);
 // the same of a run that wrote `output`; none where that has other bytes than the run gave it (`xxh64`)
 std::optional<Json> finished_results(const Path& folder, const Json& settings, const Path& output);
 
-// Whether `folder` holds a run with these settings that has not come to its end: what it may have written is its own
+// Whether `folder` holds a run with these settings (null: any) that has not come to its end: what it may have written
+// is its own
 bool goes_on(const Path& folder, const Json& settings);
 
 // The DriveRecord of a path beside its pictures; where it can have none, a warning says why

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/base/file.h"
 
+#include "runtime/base/final_name.h"
 #include "runtime/base/memory_files.h"
 #include "runtime/base/quote.h"
 #include "runtime/base/text_start.h"
@@ -22,16 +23,11 @@ constexpr size_t kPieceBytes = size_t(1) << 18; // stay in a cache
 using FileType = std::filesystem::file_type;
 
 // none: it cannot be examined. A name that is too long for any file is not found
-FileType type_of(const Path& path, std::error_code& error)
-{
-    const FileType type = std::filesystem::status(path, error).type();
-    return error == std::errc::filename_too_long ? FileType::not_found : type;
-}
-
 FileType type_of(const Path& path)
 {
-    std::error_code ignored;
-    return type_of(path, ignored);
+    std::error_code error;
+    const FileType type = std::filesystem::status(path, error).type();
+    return error == std::errc::filename_too_long ? FileType::not_found : type;
 }
 
 struct OpenFile {
@@ -109,23 +105,9 @@ Result<Buffer> read_whole(const Path& path, uint64_t max_bytes)
     return buffer;
 }
 
-Path folder_of(const Path& path)
-{
-    const Path folder = path.parent_path();
-    return folder.empty() ? Path(".") : folder;
-}
-
 tl::unexpected<Error> cannot_write(const Path& path, int error)
 {
     return fail(ErrorCode::bad_input, "cannot write {}: {}", quote_path(path), system::message_of(error));
-}
-
-// names that are new or changed in a folder survive a power cut
-Status flush_names(const Path& folder)
-{
-    if (const int error = system::flush_folder(folder))
-        return fail(ErrorCode::bad_input, "cannot flush folder {}: {}", quote_path(folder), system::message_of(error));
-    return {};
 }
 
 // Paths in a folder that pass the test, sorted: what an iterator finds on the disk, and what `part` makes of the names
@@ -323,13 +305,14 @@ Status AtomicFile::commit()
     if (file_)
         SR_CHECK(flush());
     const Together renamed_and_forgotten;
-    if (const int error = system::rename_surely(temporary_, path_)) {
+    Status named = rename_whole(temporary_, path_);
+    if (!named) {
         discard();
-        return cannot_write(path_, error);
+        return named;
     }
     temporary_.clear();
     unfinished_.reset();
-    return flush_names(folder_of(path_));
+    return {};
 }
 
 Status write_file_atomically(const Path& path, std::span<const std::byte> bytes)

@@ -7,6 +7,18 @@
 
 namespace semrover {
 
+Path folder_of(const Path& path)
+{
+    return path.has_parent_path() ? path.parent_path() : Path(".");
+}
+
+Status flush_names(const Path& folder)
+{
+    if (const int error = system::flush_folder(folder))
+        return fail(ErrorCode::bad_input, "cannot flush folder {}: {}", quote_path(folder), system::message_of(error));
+    return {};
+}
+
 Status refuse_existing(const Path& path, bool replace)
 {
     if (replace)
@@ -22,13 +34,9 @@ Status refuse_existing(const Path& path, bool replace)
 
 Status rename_whole(const Path& from, const Path& to)
 {
-    const Path folder = to.has_parent_path() ? to.parent_path() : Path(".");
-    int error = system::rename_surely(from, to);
-    if (!error)
-        error = system::flush_folder(folder);
-    if (error)
+    if (const int error = system::rename_surely(from, to))
         return fail(ErrorCode::bad_input, "cannot write {}: {}", quote_path(to), system::message_of(error));
-    return {};
+    return flush_names(folder_of(to));
 }
 
 } // namespace semrover

@@ -6,6 +6,11 @@
 
 namespace semrover {
 
+Path folder_of(const Path& path); // that it lies in; "." where it names none
+
+// Names that are new or changed in a folder survive a power cut.
+Status flush_names(const Path& folder);
+
 // usage where something is there that is not to be replaced; bad_input where that cannot be told
 Status refuse_existing(const Path& path, bool replace);
 

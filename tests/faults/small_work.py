@@ -46,7 +46,7 @@ v 0 4 0
 f 1 2 3 4
 """
 
-# in the order that inputs are made: NAME, the words, what it makes for others. A name ends in the program's
+# what the others read, in the order in which it is made
 INPUTS = (
     f"generate in/labels.sgrid -m in/model {POINTS} -o in/points.sgrid",
     f"generate in/labels.sgrid -m in/model {POINTS} --along in/ahead.tum --horizon 1 --tile-size 3 -o in/tiles",
@@ -55,7 +55,7 @@ INPUTS = (
     "dataset pack in/drawn -o in/set",
 )
 
-# those that go on from what is there, and those that begin again
+# those that go on from what is there, and those that begin again, which want -y where a file of theirs had its name
 GOES_ON = {
     "generate": f"generate in/labels.sgrid -m in/model {POINTS} --ply out/points.ply -o out/points.sgrid",
     "generate_cold": f"generate in/labels.sgrid -m in/model {POINTS} -o out/points.sgrid",
@@ -94,8 +94,6 @@ BEGINS_AGAIN = {
     "video": f"render in/points.sgrid {SIZE} --video out/drive.mp4 -o out/drawn",
 }
 COMMANDS = {**GOES_ON, **BEGINS_AGAIN}
-# that want -y where they ended after a file of theirs had its name
-MAY_WANT_YES = {*BEGINS_AGAIN}
 OF_SCENES = ("voxelize", "fuse", "streets")
 
 STATE = ("lock", "journal.jsonl")
@@ -152,14 +150,14 @@ class SmallWork:
                                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 
     def run(self, line, more=(), name="", **variables):
-        """-> the process, which has ended; 60 s are a hang"""
+        """-> the process, which has ended; 120 s are a hang"""
         process = self.start(line, more, name, **variables)
         try:
-            process.stderr_text = process.communicate(timeout=120)[1]
+            text = process.communicate(timeout=120)[1]
         except subprocess.TimeoutExpired:
             process.kill()
-            process.stderr_text = process.communicate()[1] + "\nHANGS"
-        return subprocess.CompletedProcess(process.args, process.returncode, None, process.stderr_text)
+            text = process.communicate()[1] + "\nHANGS"
+        return subprocess.CompletedProcess(process.args, process.returncode, None, text)
 
     def clear(self):
         shutil.rmtree(self.out)
@@ -174,8 +172,7 @@ class SmallWork:
         for path in self.files():
             name = str(path.relative_to(self.out))
             if path.name not in STATE and not name.startswith("cache/") and ".semrover-" not in name and \
-                    not name.endswith((".passing", ".making")) and \
-                    not any(piece in name for piece in PIECES):
+                    not name.endswith((".passing", ".making")) and not any(piece in name for piece in PIECES):
                 found[name] = essence(path)
         return found
 

@@ -11,7 +11,7 @@ import pathlib
 import tempfile
 import unittest
 
-from small_work import COMMANDS, MAY_WANT_YES, SmallWork, differences, essence
+from small_work import BEGINS_AGAIN, COMMANDS, SmallWork, differences, essence
 
 LIBRARY = os.environ["FAULTY_FILES"]
 MOST = os.environ.get("FAULTS", "1")
@@ -53,7 +53,7 @@ class Faults(unittest.TestCase):
 
     @classmethod
     def tearDownClass(cls):
-        print("\ncommand | calls | faults | ended with a line | went on to the same bytes | harmless")
+        print("\ncommand | calls | faults | ended with a line and went on to the same bytes | harmless")
         for row in cls.table:
             print(" | ".join(str(cell) for cell in row))
 
@@ -85,7 +85,7 @@ class Faults(unittest.TestCase):
                         happened[self.told(self.fault, name, line, kind, call, error)] += 1
         total = sum(happened.values())
         self.table.append((name, ", ".join(f"{k} {n}" for k, n in sorted(counts.items())), total, happened["line"],
-                           happened["line"], happened["harmless"]))
+                           happened["harmless"]))
         print(self.table[-1], flush=True)
 
     def told(self, check, *words):
@@ -139,7 +139,7 @@ class Faults(unittest.TestCase):
             again = self.work.run(line, name=name)
             if again.returncode == 2 and not self.differences():
                 again.returncode = 0  # all was done: it says that it is there
-            if again.returncode == 2 and name in MAY_WANT_YES and "-y replaces" in again.stderr:
+            if again.returncode == 2 and name in BEGINS_AGAIN and "-y replaces" in again.stderr:
                 again = self.work.run(line, ["-y"], name=name)
             self.went_on[state] = again.returncode, again.stderr, self.differences() if not again.returncode else {}
         self.assertEqual(self.went_on[state], (0, self.went_on[state][1], {}), after)

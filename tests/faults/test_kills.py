@@ -9,7 +9,7 @@ import tempfile
 import time
 import unittest
 
-from small_work import COMMANDS, MAY_WANT_YES, SmallWork, differences
+from small_work import BEGINS_AGAIN, COMMANDS, SmallWork, differences
 
 KILLS = int(os.environ.get("KILLS", "10"))
 USUAL = ",".join(COMMANDS) if KILLS >= len(COMMANDS) else \
@@ -57,7 +57,7 @@ class Kills(unittest.TestCase):
             return "was done"
         if again.returncode == 2 and "-y" in again.stderr:
             outcome = "was refused, and with -y gave the same bytes"
-            self.assertTrue(name in MAY_WANT_YES, f"after {seconds:.3f} s: {again.stderr}")
+            self.assertTrue(name in BEGINS_AGAIN, f"after {seconds:.3f} s: {again.stderr}")
             again = self.work.run(COMMANDS[name], ["-y"], name=name)
         self.assertEqual(again.returncode, 0, f"after {seconds:.3f} s: {again.stderr}")
         self.assertEqual(differences(self.whole[name], self.work.results()), {}, f"after {seconds:.3f} s")

@@ -11,7 +11,7 @@ import tempfile
 import unittest
 
 from power_cuts import cuts, put, read_record
-from small_work import COMMANDS, MAY_WANT_YES, SmallWork, differences
+from small_work import BEGINS_AGAIN, COMMANDS, SmallWork, differences
 
 LIBRARY = os.environ["FAULTY_FILES"]
 MOST = os.environ.get("CUTS", "3")
@@ -66,7 +66,7 @@ class PowerCuts(unittest.TestCase):
             self.assertEqual(len(lines), 2 if again.returncode == 7 else 1, again.stderr)
             self.assertIn(again.returncode, (2, 3, 7), lines[0])
             self.assertTrue(lines[0].startswith("semrover: error: "), lines[0])
-            self.assertTrue("-y" in lines[0] and (name in MAY_WANT_YES or again.returncode == 3), lines[0])
+            self.assertTrue("-y" in lines[0] and (name in BEGINS_AGAIN or again.returncode == 3), lines[0])
             again = self.work.run(line, ["-y"], name=name)
             outcome = "refused"
         self.assertEqual(again.returncode, 0, again.stderr)

@@ -287,17 +287,6 @@ bool TilesRun::is_whole() const
            std::ranges::all_of(tiles->tiles(), [&](const auto& entry) { return tiles->read(entry.first).has_value(); });
 }
 
-// the same run is done and its tiles are there; what is not there is made again
-Result<bool> TilesRun::finished_before()
-{
-    SR_TRY(const Json wanted, settings());
-    SR_TRY(RunFolder run, open_run(folder(), wanted, globals_.yes, {{}}, true));
-    run_.emplace(std::move(run));
-    if (run_->results() && is_whole())
-        finished_ = run_->results();
-    return finished_.has_value();
-}
-
 // removes the tiles in the output but those that are named
 void TilesRun::remove_tiles_but(const std::set<std::string>& names) const
 {
@@ -360,9 +349,13 @@ Result<bool> TilesRun::begin()
         print_estimate(expected, globals_);
         return true;
     }
-    SR_TRY(const bool finished, finished_before());
-    if (finished)
+    SR_TRY(const Json wanted, settings());
+    SR_TRY(RunFolder run, open_run(folder(), wanted, globals_.yes, {{}}, true));
+    run_.emplace(std::move(run));
+    if (run_->results() && is_whole()) { // else what is not there is made again
+        finished_ = run_->results();
         return true;
+    }
     if (const Status opened = open(); !opened) {
         remove_run();
         return tl::make_unexpected(opened.error());

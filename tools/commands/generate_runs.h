@@ -108,7 +108,6 @@ class TilesRun : public GenerateRun {
     Status read();
     Result<Json> settings() const;
     bool is_whole() const;
-    Result<bool> finished_before();
     void remove_tiles_but(const std::set<std::string>& names) const;
     Status clear_output() const;
     Status open();
