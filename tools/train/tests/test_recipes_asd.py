@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from semtrain import asd, empty_prompt, measure_frames, model_folder, safetensors_file, vae
+from semtrain import asd, distil_asd, empty_prompt, measure_frames, model_folder, safetensors_file, vae
 from semtrain.denoising import alphas_cumprod
 from semtrain.draws import draws, generator
 from semtrain.frames import find_drives
@@ -36,6 +36,9 @@ ASD = {**COMMON, "in_channels": 13, "out_channels": 4, "block_out_channels": [16
        "dropout": 0.3, "first_share": 0.1, "previous_noise": [0.3, 0.7], "weighting": "v", "prediction_type": "v_prediction",
        "timestep_spacing": "trailing", "timestep_power": 0.8, "few_steps": [2], "sampler_share": 0.5,
        "defaults": {"num_inference_steps": 2, "guidance_scale": 1.5, "previous_noise": 0.3}}
+
+
+DISTIL = {**COMMON, "text_tokens": 1, "train_text": True, "crop": [6, 6], "batch": 4, "mirror": True, "chained": 0.5}
 
 
 def put_radius(drive, radius):
@@ -79,7 +82,7 @@ class Recipes(unittest.TestCase):
         for i in range(2):
             draw_drive(cls.path("frames", str(i)), i)
             put_radius(cls.path("frames", str(i)), "auto")
-        for name, config in (("vae", VAE), ("asd", ASD)):
+        for name, config in (("vae", VAE), ("asd", ASD), ("distil", DISTIL)):
             with open(cls.path(name + ".json"), "w") as file:
                 json.dump(config, file)
         cls.train(vae, "vae", "of_vae", "--set", "steps=60")
@@ -225,6 +228,51 @@ class Recipes(unittest.TestCase):
         write_text_encoder(self.path("plain"), width + 8)
         with self.assertRaisesRegex(SystemExit, f"the text has {width + 8} channels, the UNet expects {width}"):
             asd.read_init(self.path("plain"), config)
+
+    def distil(self, output, *more):
+        self.train(distil_asd, "distil", output, "--teacher", self.path("taught"), *more)
+
+    def one_step_error(self, folder):
+        """of a model's one step against the teacher's two, on frames whose previous ones are true"""
+        config = {**DISTIL, "chained": 0.0, "batch": 16}
+        teacher = distil_asd.Teacher(self.path("taught"), config)
+        made = sequences(self.path("of_vae", "vae"), find_drives(self.path("frames")), self.path("measured"), config)
+        model, of_model = asd.Renderer(config), dict(config)
+        model.load_state_dict({n: t.float() for n, t in asd.read_init(folder, of_model).items()})
+        with torch.no_grad():
+            return float(distil_asd.loss_of(distil_asd.Pairs(made, 0.3, config), teacher, config)(model, 1000)[0])
+
+    def test_one_step_of_a_student_draws_what_two_of_its_teacher_do(self):
+        self.train_asd("taught", "--set", "steps=60", "--set", "few_steps=[2]")
+        index = read_json(self.path("taught", "model_index.json"))
+        index["defaults"]["renderer"]["guidance_scale"] = 1.5
+        write_json(self.path("taught", "model_index.json"), index)
+        self.distil("student", "--set", "steps=80", "--held-out", self.path("frames"))
+        before, after = (self.one_step_error(self.path(name)) for name in ("taught", "student"))
+        self.assertLess(after, 0.5 * before)
+        defaults = read_json(self.path("student", "model_index.json"))["defaults"]["renderer"]
+        self.assertEqual((defaults["num_inference_steps"], defaults["guidance_scale"]), (1, 1))
+        self.assertEqual(defaults["splat_radius"], "auto")
+        self.check_that_continuing_changes_nothing(self.distil, "distilled")
+        self.run_engine("refine", self.path("frames", "0", "buffer"), "-m", self.path("student"), "-o",
+                        self.path("in_one_step"), "--frames", "0:1", "--quiet")
+        scheduler = self.path("taught", "scheduler", "scheduler_config.json")
+        write_json(scheduler, {**read_json(scheduler), "timestep_spacing": "leading"})
+        with self.assertRaisesRegex(SystemExit, "expected timestep_spacing trailing"):
+            self.distil("refused")
+
+    def test_pairs_are_neighbours_and_first_frames_have_no_previous(self):
+        made = sequences(self.path("of_vae", "vae"), find_drives(self.path("frames")), self.path("measured"), DISTIL)
+        config = {**DISTIL, "batch": 64, "crop": list(made[0].truth.shape[2:])}
+        (previous, buffer, _), truth, _, has_previous, this, *_ = distil_asd.Pairs(made, 0.0, config).make(0)
+        first, before_first = ~has_previous.flatten(), previous.flatten(1).abs().sum(1) == 0
+        self.assertTrue(0.1 < first.float().mean() < 0.6)
+        for i in range(64):
+            s, n = next((s, n) for s in made for n in range(3) if torch.equal(s.buffer[n], this[i]))
+            self.assertEqual(bool(first[i]), n == 0)
+            self.assertTrue(torch.equal(buffer[i], s.buffer[max(n - 1, 0)]))
+            self.assertTrue(torch.equal(truth[i], s.truth[max(n - 1, 0)]))
+            self.assertEqual(bool(before_first[i]), n < 2)
 
     def test_the_engine_loads_the_folder_and_draws_a_frame_with_it(self):
         self.train_asd("model", "--held-out", self.path("frames"))
