@@ -103,6 +103,32 @@ TEST(CliEvalFrames, psnr_and_ssim_by_hand)
     EXPECT_TRUE(table.out.starts_with("2 frames, PSNR 31.141 dB in the mean of 1 frames, 1 equal\n")) << table.out;
 }
 
+TEST(CliEvalFrames, figures_by_distance)
+{
+    const Pictures p;
+    p.put("made/frames/000000.png", 110, 100);
+    p.put("true/color/000000.png", 100, 120);
+    p.put_depths("true/depth/000000.png", 5000, 30000);  // millimetres
+    p.put("true/label/000000.png", 2, 13, kWidth, true); // building, car
+    const std::string call = "frames -q " + (p / "made") + " " + (p / "true") + " --depth " + (p / "true");
+    const Json report = json_of(eval(call + " --json --labels " + (p / "true")).out);
+    ASSERT_EQ(report["distances"].size(), 4u);
+    const Json &near = report["distances"][0], &far = report["distances"][3];
+    EXPECT_EQ(near["to"], 6);
+    EXPECT_NEAR(near["psnr"].get<double>(), 10 * std::log10(65025. / 100), 1e-9);
+    EXPECT_NEAR(near["sharpness"].get<double>(), 0.5, 1e-9); // steps of 10 and of 20 between the halves
+    EXPECT_NEAR(far["psnr"].get<double>(), 10 * std::log10(65025. / 400), 1e-9);
+    EXPECT_TRUE(far["to"].is_null());
+    EXPECT_EQ(far["labels"]["car"]["pixels"], far["pixels"]);
+    EXPECT_EQ(report["distances"][1]["pixels"], 0);
+    EXPECT_TRUE(report["distances"][1]["sharpness"].is_null());
+    const ProgramResult table = eval(call);
+    EXPECT_NE(table.out.find("0 to 6 m"), std::string::npos) << table.out;
+    p.put_depth("small/000000.png", 5000, 25);
+    expect_error(eval("frames -q " + (p / "made") + " " + (p / "true") + " --depth " + (p / "small")), 3,
+                 "000000.png' is 25 x 16 pixels, expected 24 x 16");
+}
+
 TEST(CliEvalFrames, labels_are_numbers_of_any_kind_of_picture)
 {
     const Pictures p;

@@ -149,7 +149,7 @@ TEST(EngineFrameSimilarity, masks_and_classes_share_the_pixels_out)
             for (size_t c = 0; c < 3; ++c)
                 frame.pixels[3 * i + c] = x < 10 ? 100 : y < 10 ? 95 : 90;
         }
-    const FrameSimilarity s = frame_similarity(frame, truth, visible, labels);
+    const FrameSimilarity s = frame_similarity(frame, truth, {visible, labels, {}});
     EXPECT_EQ(s.visible.pixels, 200u);
     EXPECT_EQ(s.hidden.pixels, 400u);
     EXPECT_NEAR(s.visible.psnr(), 20 * std::log10(25.5), 1e-12);
@@ -164,6 +164,51 @@ TEST(EngineFrameSimilarity, masks_and_classes_share_the_pixels_out)
     twice += s;
     EXPECT_EQ(twice.all.psnr(), s.all.psnr());
     EXPECT_EQ(twice.labels[19].pixels, 2 * s.labels[19].pixels);
+}
+
+// luma = slope * x, gray
+ImageRgb8 ramp(uint32_t width, uint32_t height, uint32_t slope)
+{
+    ImageRgb8 image = filled(width, height, 0);
+    for (size_t i = 0; i < image.pixels.size(); ++i)
+        image.pixels[i] = uint8_t(slope * (i / 3 % width));
+    return image;
+}
+
+TEST(EngineFrameSimilarity, sharpness_is_the_share_of_gradients)
+{
+    const ImageRgb8 truth = ramp(30, 20, 4), twice = ramp(30, 20, 8);
+    EXPECT_NEAR(frame_similarity(truth, truth).all.sharpness(), 1, 1e-12);
+    EXPECT_NEAR(frame_similarity(twice, truth).all.sharpness(), 2, 1e-12);
+    EXPECT_NEAR(frame_similarity(truth, twice).all.sharpness(), 0.5, 1e-12);
+    // 18 x 28 pixels are not on the rim; Sobel's weights see eight times the slope
+    EXPECT_NEAR(frame_similarity(truth, twice).all.gradients, 18 * 28 * 32. * 32, 1e-6);
+    EXPECT_TRUE(std::isnan(frame_similarity(filled(30, 20, 7), filled(30, 20, 9)).all.sharpness()));
+}
+
+TEST(EngineFrameSimilarity, distances_share_the_pixels_that_have_a_depth)
+{
+    const ImageRgb8 truth = ramp(40, 20, 4);
+    ImageRgb8 frame = truth;
+    std::vector<float> depth(800);
+    std::vector<uint8_t> labels(800);
+    for (size_t i = 0; i < 800; ++i) {
+        const size_t x = i % 40;
+        depth[i] = x < 5 ? 0.f : x < 10 ? 5.9f : x < 20 ? 6.f : x < 30 ? 24.9f : 25.f;
+        labels[i] = x % 2 ? 19 : 255;
+        for (size_t c = 0; c < 3; ++c)
+            frame.pixels[3 * i + c] = uint8_t(x < 20 ? 4 * x : x < 30 ? 80 : 8 * x - 160); // flat, then twice as steep
+    }
+    const FrameSimilarity s = frame_similarity(frame, truth, {{}, labels, depth});
+    const auto pixels = [&](size_t range) { return s.distances[range][19].pixels + s.distances[range][20].pixels; };
+    EXPECT_EQ(pixels(0), 100u);
+    EXPECT_EQ(pixels(1), 200u);
+    EXPECT_EQ(pixels(2), 200u);
+    EXPECT_EQ(pixels(3), 200u);
+    EXPECT_EQ(s.distances[1][19].pixels, 100u);
+    EXPECT_NEAR(s.distances[0][20].sharpness(), 1, 1e-12);
+    EXPECT_LT(s.distances[2][20].sharpness(), 0.5);
+    EXPECT_GT(s.distances[3][20].sharpness(), 1.8);
 }
 
 } // namespace engine_frame_similarity_test

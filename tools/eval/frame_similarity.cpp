@@ -70,6 +70,17 @@ double square_error(const ImageRgb8& a, const ImageRgb8& b, size_t pixel)
     return sum;
 }
 
+// Of pixel (x, y), which is not on the rim; Sobel's weights.
+double squared_gradient(const ImageRgb8& image, size_t x, size_t y)
+{
+    const auto at = [&](size_t column, size_t row) {
+        return luma(image, (y + row - 1) * image.width + x + column - 1);
+    };
+    const double across = at(2, 0) + 2 * at(2, 1) + at(2, 2) - at(0, 0) - 2 * at(0, 1) - at(0, 2);
+    const double down = at(0, 2) + 2 * at(1, 2) + at(2, 2) - at(0, 0) - 2 * at(1, 0) - at(2, 0);
+    return across * across + down * down;
+}
+
 } // namespace
 
 SimilaritySums& SimilaritySums::operator+=(const SimilaritySums& other)
@@ -78,6 +89,8 @@ SimilaritySums& SimilaritySums::operator+=(const SimilaritySums& other)
     squares += other.squares;
     windows += other.windows;
     similarity += other.similarity;
+    gradients += other.gradients;
+    true_gradients += other.true_gradients;
     return *this;
 }
 
@@ -93,6 +106,11 @@ double SimilaritySums::ssim() const
     return windows ? similarity / double(windows) : 0;
 }
 
+double SimilaritySums::sharpness() const
+{
+    return std::sqrt(gradients / true_gradients);
+}
+
 FrameSimilarity& FrameSimilarity::operator+=(const FrameSimilarity& other)
 {
     all += other.all;
@@ -100,6 +118,9 @@ FrameSimilarity& FrameSimilarity::operator+=(const FrameSimilarity& other)
     hidden += other.hidden;
     for (size_t i = 0; i < labels.size(); ++i)
         labels[i] += other.labels[i];
+    for (size_t range = 0; range < distances.size(); ++range)
+        for (size_t i = 0; i < labels.size(); ++i)
+            distances[range][i] += other.distances[range][i];
     return *this;
 }
 
@@ -129,28 +150,39 @@ std::vector<double> ssim_map(const ImageRgb8& a, const ImageRgb8& b)
     return map;
 }
 
-FrameSimilarity frame_similarity(const ImageRgb8& frame, const ImageRgb8& truth, std::span<const uint8_t> visible,
-                                 std::span<const uint8_t> labels)
+FrameSimilarity frame_similarity(const ImageRgb8& frame, const ImageRgb8& truth, const KnownPixels& known)
 {
     const size_t pixels = size_t(frame.width) * frame.height;
-    SR_ASSERT((visible.empty() || visible.size() == pixels) && (labels.empty() || labels.size() == pixels),
-              "{} pixels, {} visible, {} labels", pixels, visible.size(), labels.size());
+    const auto covers = [&](size_t values) { return values == 0 || values == pixels; };
+    SR_ASSERT(covers(known.visible.size()) && covers(known.labels.size()) && covers(known.depth.size()),
+              "{} pixels, {} visible, {} labels, {} depths", pixels, known.visible.size(), known.labels.size(),
+              known.depth.size());
     const std::vector<double> map = ssim_map(frame, truth);
-    FrameSimilarity y;
+    FrameSimilarity result;
     for (size_t i = 0; i < pixels; ++i) {
-        const size_t row = i / frame.width - kRadius, column = i % frame.width - kRadius; // of the map, or wrapped
+        const size_t y = i / frame.width, x = i % frame.width;
+        const size_t row = y - kRadius, column = x - kRadius; // of the map, or wrapped
         SimilaritySums own{.pixels = 1, .squares = square_error(frame, truth, i)};
         if (!map.empty() && row < frame.height - 2 * kRadius && column < frame.width - 2 * kRadius) {
             own.windows = 1;
             own.similarity = map[row * (frame.width - 2 * kRadius) + column];
         }
-        y.all += own;
-        if (!visible.empty())
-            (visible[i] >= 128 ? y.visible : y.hidden) += own;
-        if (!labels.empty())
-            y.labels[std::min<size_t>(labels[i], kClassCount)] += own;
+        if (x > 0 && y > 0 && x + 1 < frame.width && y + 1 < frame.height) {
+            own.gradients = squared_gradient(frame, x, y);
+            own.true_gradients = squared_gradient(truth, x, y);
+        }
+        result.all += own;
+        if (!known.visible.empty())
+            (known.visible[i] >= 128 ? result.visible : result.hidden) += own;
+        const size_t label = known.labels.empty() ? kClassCount : std::min<size_t>(known.labels[i], kClassCount);
+        if (!known.labels.empty())
+            result.labels[label] += own;
+        if (!known.depth.empty() && known.depth[i] > 0)
+            result
+                .distances[size_t(std::ranges::upper_bound(kDistances, known.depth[i]) - kDistances.begin())][label] +=
+                own;
     }
-    return y;
+    return result;
 }
 
 } // namespace semrover

@@ -15,15 +15,24 @@ struct SimilaritySums {
     double squares = 0;   // of differences of 8-bit sRGB values, over three channels
     uint64_t windows = 0; // of SSIM, with their middle on such a pixel
     double similarity = 0;
+    double gradients = 0, true_gradients = 0; // squares of luma's, by Sobel, of pixels that are not on the rim
 
     SimilaritySums& operator+=(const SimilaritySums& other);
     double psnr() const; // dB, 10 log10(255^2 / mean square); infinite where all values are equal
     double ssim() const;
+    // Tenengrad of the frame as a share of the truth's: below 1 what is blurred, above 1 noise or edges that are too
+    // many. Source: Krotkov 1988, IJCV 1(3), equation 7. NaN where the truth has none
+    double sharpness() const;
 };
 
+constexpr std::array kDistances{6.0, 12.0, 25.0}; // metres, where a range of distances ends; the last has no end
+
 struct FrameSimilarity {
+    using Classes = std::array<SimilaritySums, kClassCount + 1>; // the last: of no class
+
     SimilaritySums all, visible, hidden;
-    std::array<SimilaritySums, kClassCount + 1> labels; // the last: of no class
+    Classes labels;
+    std::array<Classes, kDistances.size() + 1> distances; // of pixels with a depth
 
     FrameSimilarity& operator+=(const FrameSimilarity& other);
 };
@@ -35,9 +44,14 @@ struct FrameSimilarity {
 constexpr uint32_t kSsimWindow = 11;
 std::vector<double> ssim_map(const ImageRgb8& a, const ImageRgb8& b);
 
-// of two pictures of one size. `visible` [height, width]: 128 and more is visible; `labels` [height, width]: a class or
-// anything else; both may be empty.
-FrameSimilarity frame_similarity(const ImageRgb8& frame, const ImageRgb8& truth, std::span<const uint8_t> visible = {},
-                                 std::span<const uint8_t> labels = {});
+// what is known of pixels, each [height, width] or empty
+struct KnownPixels {
+    std::vector<uint8_t> visible; // 128 and more is visible
+    std::vector<uint8_t> labels;  // a class or anything else
+    std::vector<float> depth;     // metres; 0: nothing
+};
+
+// of two pictures of one size
+FrameSimilarity frame_similarity(const ImageRgb8& frame, const ImageRgb8& truth, const KnownPixels& known = {});
 
 } // namespace semrover

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
-// semrover eval frames FRAMES TRUTH: how alike pictures of equal names are: PSNR and SSIM, also by visibility and
-// class, and LPIPS
+// semrover eval frames FRAMES TRUTH: how alike pictures of equal names are: PSNR, SSIM and sharpness, also by
+// visibility, class and distance, and LPIPS
+#include "engine/format/transforms.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
@@ -20,11 +21,12 @@ namespace semrover {
 namespace {
 
 struct EvalFramesArguments {
-    std::string frames, truth, visible, labels, map, lpips;
+    std::string frames, truth, visible, labels, depth, map, lpips;
 };
 
 struct FrameInputs {
-    FrameFiles frames, truth, visible, labels; // the last two may be empty
+    FrameFiles frames, truth, visible, labels, depth; // the last three may be empty
+    double depth_unit = kMillimetre;
 };
 
 Result<FrameInputs> list_inputs(const EvalFramesArguments& o)
@@ -33,12 +35,16 @@ Result<FrameInputs> list_inputs(const EvalFramesArguments& o)
     SR_TRY(in.frames, list_frames(o.frames, "color"));
     SR_TRY(in.truth, list_frames(o.truth, "color"));
     SR_CHECK(check_names(in.frames, o.frames, in.truth, o.truth, true));
-    for (const auto& [folder, kind, files] :
-         {std::tuple{&o.visible, "visible", &in.visible}, {&o.labels, "label", &in.labels}}) {
+    for (const auto& [folder, kind, files] : {std::tuple{&o.visible, "visible", &in.visible},
+                                              {&o.labels, "label", &in.labels},
+                                              {&o.depth, "depth", &in.depth}}) {
         if (folder->empty())
             continue;
         SR_TRY(*files, list_frames(*folder, kind));
         SR_CHECK(check_names(in.frames, o.frames, *files, *folder, false));
+    }
+    if (!o.depth.empty()) {
+        SR_TRY(in.depth_unit, read_depth_unit(o.depth));
     }
     return in;
 }
@@ -75,21 +81,32 @@ Status check_side(const Path& path, const ImageRgb8& frame, uint32_t least, std:
     return {};
 }
 
+Result<KnownPixels> read_known(const FrameInputs& in, const std::string& name, ImageSize size, PictureClasses& classes)
+{
+    KnownPixels y;
+    if (!in.visible.empty()) {
+        SR_TRY(y.visible, read_gray_frame(in.visible.at(name), size));
+    }
+    if (!in.labels.empty()) {
+        SR_TRY(y.labels, read_label_frame(in.labels.at(name), size, classes));
+    }
+    if (!in.depth.empty()) {
+        SR_TRY(const DepthPicture depth, read_depth_frame(in.depth.at(name), size, in.depth_unit));
+        for (const uint32_t value : depth.pixels)
+            y.depth.push_back(float(value * depth.unit));
+    }
+    return y;
+}
+
 Result<FrameFigures> measure_frame(const FrameInputs& in, const std::string& name, PictureClasses& classes,
                                    Lpips* lpips)
 {
     SR_TRY(const ImageRgb8 frame, read_color_frame(in.frames.at(name), {}));
     const ImageSize size{frame.width, frame.height};
     SR_TRY(const ImageRgb8 truth, read_color_frame(in.truth.at(name), size));
-    std::vector<uint8_t> visible, labels;
-    if (!in.visible.empty()) {
-        SR_TRY(visible, read_gray_frame(in.visible.at(name), size));
-    }
-    if (!in.labels.empty()) {
-        SR_TRY(labels, read_label_frame(in.labels.at(name), size, classes));
-    }
+    SR_TRY(const KnownPixels known, read_known(in, name, size, classes));
     SR_CHECK(check_side(in.frames.at(name), frame, kSsimWindow, "the window of SSIM"));
-    FrameFigures y{frame_similarity(frame, truth, visible, labels)};
+    FrameFigures y{frame_similarity(frame, truth, known)};
     if (lpips) {
         SR_CHECK(check_side(in.frames.at(name), frame, lpips->least_side(), "what the network of LPIPS can see"));
         SR_TRY(y.lpips, lpips->distance(frame, truth));
@@ -107,7 +124,32 @@ Json sums_json(const SimilaritySums& s)
 {
     return {{"pixels", s.pixels},
             {"psnr", s.pixels ? number_or_null(s.psnr()) : Json()},
-            {"ssim", s.windows ? Json(s.ssim()) : Json()}};
+            {"ssim", s.windows ? Json(s.ssim()) : Json()},
+            {"sharpness", number_or_null(s.sharpness())}};
+}
+
+Json labels_json(const FrameSimilarity::Classes& classes)
+{
+    Json y = Json::object();
+    for (size_t i = 0; i < classes.size(); ++i)
+        if (classes[i].pixels)
+            y[label_name(i)] = sums_json(classes[i]);
+    return y;
+}
+
+SimilaritySums sum_of(const FrameSimilarity::Classes& classes)
+{
+    SimilaritySums y;
+    for (const SimilaritySums& of_class : classes)
+        y += of_class;
+    return y;
+}
+
+// "6 to 12 m"
+std::string range_name(size_t range)
+{
+    const std::string from = range ? fmt::format("{} ", kDistances[range - 1]) : "0 ";
+    return range < kDistances.size() ? fmt::format("{}to {} m", from, kDistances[range]) : from + "m and more";
 }
 
 void add_parts(const FrameInputs& in, const FrameSimilarity& s, Json& report)
@@ -116,19 +158,23 @@ void add_parts(const FrameInputs& in, const FrameSimilarity& s, Json& report)
         report["visible"] = sums_json(s.visible);
         report["hidden"] = sums_json(s.hidden);
     }
-    if (in.labels.empty())
-        return;
-    report["labels"] = Json::object();
-    for (size_t i = 0; i < s.labels.size(); ++i)
-        if (s.labels[i].pixels)
-            report["labels"][label_name(i)] = sums_json(s.labels[i]);
+    if (!in.labels.empty())
+        report["labels"] = labels_json(s.labels);
+    for (size_t range = 0; !in.depth.empty() && range < s.distances.size(); ++range) {
+        Json& row = report["distances"].emplace_back(sums_json(sum_of(s.distances[range])));
+        row["from"] = range ? kDistances[range - 1] : 0.0;
+        row["to"] = range < kDistances.size() ? Json(kDistances[range]) : Json();
+        if (!in.labels.empty())
+            row["labels"] = labels_json(s.distances[range]);
+    }
 }
 
 void print_row(std::string_view name, const SimilaritySums& s)
 {
     const std::string psnr = s.pixels == 0 ? "-" : std::isfinite(s.psnr()) ? fmt::format("{:.3f}", s.psnr()) : "equal";
-    fmt::print("{:13} {:>11} {:>9} {:>8}\n", name, s.pixels, psnr,
-               s.windows ? fmt::format("{:.4f}", s.ssim()) : std::string("-"));
+    fmt::print("{:13} {:>11} {:>9} {:>8} {:>9}\n", name, s.pixels, psnr,
+               s.windows ? fmt::format("{:.4f}", s.ssim()) : "-",
+               std::isfinite(s.sharpness()) ? fmt::format("{:.3f}", s.sharpness()) : "-");
 }
 
 struct FrameMean {
@@ -145,7 +191,7 @@ void print(const FrameInputs& in, const FrameSimilarity& s, const FrameMean& mea
     fmt::print(", {} equal\n", in.frames.size() - mean.frames);
     if (lpips)
         fmt::print("LPIPS {:.4f} in the mean ({})\n", mean.lpips, lpips->backbone());
-    fmt::print("{:13} {:>11} {:>9} {:>8}\n", "", "pixels", "PSNR, dB", "SSIM");
+    fmt::print("{:13} {:>11} {:>9} {:>8} {:>9}\n", "", "pixels", "PSNR, dB", "SSIM", "sharpness");
     print_row("all", s.all);
     if (!in.visible.empty()) {
         print_row("visible", s.visible);
@@ -154,6 +200,8 @@ void print(const FrameInputs& in, const FrameSimilarity& s, const FrameMean& mea
     for (size_t i = 0; i < s.labels.size(); ++i)
         if (s.labels[i].pixels)
             print_row(label_name(i), s.labels[i]);
+    for (size_t range = 0; !in.depth.empty() && range < s.distances.size(); ++range)
+        print_row(range_name(range), sum_of(s.distances[range]));
 }
 
 void print_report(const FrameInputs& in, const FrameSimilarity& total, const FrameMean& mean, Json rows,
@@ -216,12 +264,14 @@ Status eval_frames(const EvalFramesArguments& o, const Globals& globals)
 void add_eval_frames(CLI::App& eval, const Globals& globals, Run& run)
 {
     auto o = std::make_shared<EvalFramesArguments>();
-    CLI::App* c = eval.add_subcommand("frames", "PSNR, SSIM and LPIPS of pictures against true ones of the same names");
+    CLI::App* c = eval.add_subcommand(
+        "frames", "PSNR, SSIM, sharpness and LPIPS of pictures against true ones of the same names");
     c->add_option("FRAMES", o->frames, "a folder of pictures, or what `refine`, `render` or `streets` wrote")
         ->required();
     c->add_option("TRUTH", o->truth, "likewise: pictures of the same names and sizes")->required();
     c->add_option("--visible", o->visible, "masks of these names: also figures of what is at 128 or above, and below");
     c->add_option("--labels", o->labels, "class numbers of these names, PNG or .npy: also figures of each class");
+    c->add_option("--depth", o->depth, "depth of these names: also figures by distance");
     c->add_option("--map", o->map, "JSON: label number or name to class, or null for none");
     c->add_option("--lpips", o->lpips,
                   "also LPIPS, by this network: safetensors of AlexNet or VGG16 (docs/eval.md has the layout)");
