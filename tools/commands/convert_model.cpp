@@ -5,8 +5,8 @@
 #include "engine/model/low_rank.h"
 #include "engine/model/renderer_model.h"
 #include "engine/model/weight_blocks.h"
-#include "runtime/base/final_name.h"
 #include "runtime/base/quote.h"
+#include "tools/cli/output_folder.h"
 #include "tools/cli/print_stderr.h"
 #include "tools/cli/progress.h"
 #include "tools/dataset/model_writer.h"
@@ -210,66 +210,6 @@ Result<Conversion> plan_conversion(const ConvertModelOptions& o)
 
 // ---- writing
 
-// a folder beside the output that the results are written to, gone unless commit() renames it
-class StagingFolder {
-  public:
-    explicit StagingFolder(const Path& out)
-        : out_(out), path_(out.parent_path() / unfinished_name()), unfinished_(path_)
-    {
-    }
-    StagingFolder(const StagingFolder&) = delete;
-    StagingFolder& operator=(const StagingFolder&) = delete;
-    ~StagingFolder()
-    {
-        std::error_code ignored;
-        fs::remove_all(path_, ignored);
-    }
-
-    const Path& path() const { return path_; }
-
-    Status commit()
-    {
-        const Together renamed_and_forgotten;
-        return is_there(out_) ? replace() : rename_whole(path_, out_);
-    }
-
-  private:
-    // file by file: what else lies in the folder stays, but for weights that would hide the new ones
-    Status replace() const
-    {
-        SR_TRY(std::vector<Path> files, list_tree(path_));
-        for (Path& file : files)
-            file = file.lexically_relative(path_);
-        std::error_code error;
-        for (const Path& file : files)
-            if (!error && file.filename().string().starts_with("diffusion_pytorch_model"))
-                remove_weights(out_ / file.parent_path(), error);
-        if (error)
-            return fail(ErrorCode::bad_input, "cannot write to {}: {}", quote_path(out_), error.message());
-        for (const Path& file : files) {
-            SR_CHECK(make_folder((out_ / file).parent_path()));
-            SR_CHECK(rename_whole(path_ / file, out_ / file));
-        }
-        return {};
-    }
-
-    static void remove_weights(const Path& folder, std::error_code& error)
-    {
-        std::vector<Path> old;
-        std::error_code ignored; // the folder need not exist
-        for (const auto& entry : fs::directory_iterator(folder, ignored))
-            if (entry.path().filename().string().starts_with("diffusion_pytorch_model") ||
-                entry.path().filename() == kAdapterFile)
-                old.push_back(entry.path());
-        for (const Path& path : old)
-            if (!error)
-                fs::remove(path, error);
-    }
-
-    Path out_, path_;
-    Unfinished unfinished_;
-};
-
 // each tensor reports that it is done, and stops where the user wants
 void watch(Conversion& plan, Progress& progress, uint64_t& done)
 {
@@ -291,23 +231,24 @@ Status write_conversion(Conversion& plan, const Path& out, const Globals& global
         total += files.tensors.size();
     Progress progress(progress_to_stderr(globals), "convert", "tensors", total);
     watch(plan, progress, done);
-    StagingFolder staging(out);
+    SR_CHECK(make_folder(out.parent_path()));
+    SR_TRY(OutputFolder folder, OutputFolder::create(out, true));
     for (const auto& [name, files] : plan.components)
-        SR_CHECK(write_component(staging.path() / name, files));
+        SR_CHECK(write_component(folder / name, files));
     for (const auto& [name, json] : plan.texts)
-        SR_CHECK(write_json(staging.path() / name, json));
+        SR_CHECK(write_json(folder / name, json));
     for (const auto& [name, from] : plan.copies) {
         SR_TRY(const MappedFile file, MappedFile::open(from));
-        SR_CHECK(make_folder((staging.path() / name).parent_path()));
-        SR_CHECK(write_file_atomically(staging.path() / name, file.bytes()));
+        SR_CHECK(make_folder((folder / name).parent_path()));
+        SR_CHECK(write_file_atomically(folder / name, file.bytes()));
     }
     if (plan.text) {
-        SR_CHECK(make_folder(staging.path() / "conditioning"));
-        SR_CHECK(stream_safetensors(staging.path() / "conditioning" / "conditioning.safetensors",
+        SR_CHECK(make_folder(folder / "conditioning"));
+        SR_CHECK(stream_safetensors(folder / "conditioning" / "conditioning.safetensors",
                                     std::span(&*plan.text, 1)));
     }
-    SR_CHECK(write_json(staging.path() / "model_index.json", plan.index));
-    SR_CHECK(staging.commit());
+    SR_CHECK(write_json(folder / "model_index.json", plan.index));
+    SR_CHECK(folder.commit());
     progress.update(total);
     progress.finish();
     return {};
