@@ -3,6 +3,7 @@
 // needs: programs
 #include "engine/format/image.h"
 #include "engine/scene/grid.h"
+#include "runtime/base/json.h"
 #include "tests/support/json_text.h"
 #include "tests/support/program.h"
 #include "tests/support/zip_bytes.h"
@@ -10,7 +11,6 @@
 #include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 namespace semrover {
 namespace cli_convert_scene_test {

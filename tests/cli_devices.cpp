@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // needs: programs
 #include "kernels/kernel_registry.h"
+#include "runtime/base/json.h"
 #include "tests/support/json_text.h"
 #include "tests/support/program.h"
 
 #include <algorithm>
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 #include <set>
 
 namespace semrover {
@@ -20,7 +20,8 @@ TEST(Catalogue, has_every_op_of_the_shaders_once)
     std::set<std::string> ops;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(SEMROVER_SOURCE_DIR "/shaders")) {
         const std::string file = entry.path().filename().string();
-        const bool of_bench = entry.path().parent_path().filename() == "bench"; // measures a device, is no op of a graph
+        const bool of_bench =
+            entry.path().parent_path().filename() == "bench"; // measures a device, is no op of a graph
         if (entry.path().extension() == ".comp" && !of_bench)
             ops.insert(file.substr(0, file.find('.')));
     }

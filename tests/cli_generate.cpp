@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // needs: programs
 #include "engine/scene/grid.h"
+#include "runtime/base/json.h"
 #include "runtime/base/safetensors.h"
 #include "tests/support/child_program.h"
 #include "tests/support/json_text.h"
@@ -13,7 +14,6 @@
 #include <fcntl.h>
 #include <fstream>
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 #include <sys/file.h>
 #include <unistd.h>
 

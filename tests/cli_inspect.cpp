@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // needs: programs
+#include "runtime/base/json.h"
 #include "tests/support/json_text.h"
 #include "tests/support/program.h"
 #include "tests/support/renderer_weights.h"
@@ -8,7 +9,6 @@
 
 #include <algorithm>
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 namespace semrover {
 namespace cli_inspect_test {

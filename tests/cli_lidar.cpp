@@ -4,12 +4,12 @@
 #include "engine/camera/rigid.h"
 #include "engine/format/npy.h"
 #include "engine/scene/scene_points.h"
+#include "runtime/base/json.h"
 #include "tests/support/json_text.h"
 #include "tests/support/program.h"
 #include "tests/support/scratch_folder.h"
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 namespace semrover {
 namespace cli_lidar_test {

@@ -5,7 +5,7 @@
 #include "tests/support/json_text.h"
 #include "tests/support/program.h"
 
-#include <nlohmann/json.hpp>
+#include "runtime/base/json.h"
 
 namespace semrover {
 namespace cli_object_boxes_test {

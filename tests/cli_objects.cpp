@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // needs: programs
 #include "engine/conditioning/cell_objects.h"
+#include "runtime/base/json.h"
 #include "tests/support/json_text.h"
 #include "tests/support/program.h"
 #include "tests/support/scratch_folder.h"
 
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 namespace semrover {
 namespace cli_objects_test {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // needs: programs
 // `refine` with a renderer of videos
+#include "runtime/base/json.h"
 #include "tests/support/child_program.h"
 #include "tests/support/json_text.h"
 #include "tests/support/program.h"
@@ -9,7 +10,6 @@
 
 #include <algorithm>
 #include <csignal>
-#include <nlohmann/json.hpp>
 
 namespace semrover {
 namespace cli_refine_video_test {

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // needs: programs
+#include "runtime/base/json.h"
 #include "tests/support/child_program.h"
 #include "tests/support/json_text.h"
 #include "tests/support/program.h"
@@ -9,7 +10,6 @@
 #include <algorithm>
 #include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <random>
 #include <thread>
 

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <cstring>
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 namespace semrover {
 namespace cli_verify_test {

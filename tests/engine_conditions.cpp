@@ -3,11 +3,11 @@
 // needs: device
 #include "engine/conditioning/voxel_conditions.h"
 #include "engine/voxfield/token_sampler.h"
+#include "runtime/base/json.h"
 #include "tests/support/json_text.h"
 #include "tests/support/says.h"
 
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
 namespace semrover {

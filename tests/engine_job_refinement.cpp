@@ -8,7 +8,7 @@
 #include "tests/support/renderer_folders.h"
 #include "tools/trajectory/camera_path.h"
 
-#include <nlohmann/json.hpp>
+#include "runtime/base/json.h"
 
 namespace semrover {
 namespace engine_job_refinement_test {

@@ -409,7 +409,8 @@ void show(SplatPool& pool)
     Device& device = test_device();
     ASSERT_TRUE(pool.publish());
     const auto ring = *CommandRing::create(device, 1);
-    pool.record_updates(*ring->begin(), device.next_point());
+    if (pool.record_updates(*ring->begin()))
+        pool.updates_are_submitted(device.next_point());
     ASSERT_TRUE(device.wait(*ring->submit()));
 }
 
@@ -522,6 +523,28 @@ TEST(engine_splat, what_is_made_is_seen_when_it_is_shown_and_what_was_there_stay
     EXPECT_EQ(pool->version(), version);
 }
 
+TEST(engine_splat, updates_that_were_not_submitted_are_recorded_again)
+{
+    const auto pool = pool_of(1u << 20);
+    add(*pool, {0, 0}, floor_at(0, 400));
+    ASSERT_TRUE(pool->publish());
+    const auto lost = *CommandRing::create(test_device(), 1);
+    ASSERT_TRUE(pool->record_updates(*lost->begin()));
+    EXPECT_EQ(pool->end(), 0u);
+    EXPECT_EQ(pool->version(), 0u);
+    pool->remove({0, 0}); // it may be shown by then
+    add(*pool, {1, 0}, floor_at(4, 300));
+    EXPECT_EQ(pool->places().at({1, 0}).first, 448u);
+    show(*pool);
+    EXPECT_EQ(pool->end(), 768u);
+    EXPECT_EQ(blocks_of(*pool)[0], 0u);
+    expect_splats(*pool, {1, 0}, floor_at(4, 300), {});
+    add(*pool, {0, 0}, floor_at(0, 400));
+    EXPECT_EQ(pool->places().at({0, 0}).first, 0u);
+    show(*pool);
+    expect_splats(*pool, {0, 0}, floor_at(0, 400), {});
+}
+
 TEST(engine_splat, rows_that_left_are_used_again_when_no_draw_looks_at_them)
 {
     const auto pool = pool_of(512 * SplatPool::kSplatBytes);
@@ -538,7 +561,8 @@ TEST(engine_splat, rows_that_left_are_used_again_when_no_draw_looks_at_them)
     EXPECT_EQ(*pool->add({1, 0}, more, more.size(), {}), SplatPool::Room::later);
     Device& device = test_device();
     const auto ring = *CommandRing::create(device, 1);
-    pool->record_updates(*ring->begin(), device.next_point());
+    ASSERT_TRUE(pool->record_updates(*ring->begin()));
+    pool->updates_are_submitted(device.next_point());
     EXPECT_EQ(*pool->add({1, 0}, more, more.size(), {}), SplatPool::Room::later); // a frame is on its way
     ASSERT_TRUE(device.wait(*ring->submit()));
     add(*pool, {1, 0}, more);

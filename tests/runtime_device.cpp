@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // needs: device posix
 #include "kernels/network.h"
+#include "runtime/base/json.h"
 #include "runtime/device/device.h"
 #include "runtime/device/executable.h"
 #include "runtime/device/pipeline.h"
@@ -16,7 +17,6 @@
 #include <algorithm>
 #include <cstring>
 #include <fstream>
-#include <nlohmann/json.hpp>
 
 namespace semrover {
 namespace runtime_device_test {

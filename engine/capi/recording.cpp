@@ -109,7 +109,7 @@ Result<bool> record_updates(sr_world& world, VkCommandBuffer commands, const Tim
         if (reached)
             world.retired.erase(world.retired.begin() + ptrdiff_t(i));
     }
-    return world.world->splats()->record_updates(commands, done);
+    return world.world->splats()->record_updates(commands);
 }
 
 Status show_updates(sr_world& world, bool wait)
@@ -119,8 +119,10 @@ Status show_updates(sr_world& world, bool wait)
     SR_TRY(const bool some, record_updates(world, commands, device.next_point()));
     if (!some)
         return {};
-    world.done = device.next_point();
+    const TimelinePoint done = device.next_point();
     SR_TRY(const uint64_t ticket, world.commands->submit());
+    world.done = done;
+    world.world->splats()->updates_are_submitted(done);
     return wait ? device.wait(ticket) : Status();
 }
 
@@ -147,7 +149,10 @@ sr_status sr_world_record_updates(sr_world* world, VkCommandBuffer commands, con
         SR_CHECK(splats_of(*world, "sr_world_record_updates").map([](SplatPool*) {}));
         world->updated_by_application = true;
         world->done = {done->semaphore, done->value};
-        return record_updates(*world, commands, world->done).map([](bool) {});
+        SR_TRY(const bool some, record_updates(*world, commands, world->done));
+        if (some)
+            world->world->splats()->updates_are_submitted(world->done);
+        return {};
     });
 }
 

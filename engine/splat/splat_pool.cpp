@@ -19,6 +19,21 @@ uint32_t blocks_of(uint32_t count)
 
 } // namespace
 
+void SplatPool::Changes::make_room(const Changes& more)
+{
+    shown.reserve(shown.size() + more.shown.size());
+    hidden.reserve(hidden.size() + more.hidden.size());
+}
+
+void SplatPool::Changes::take(Changes& from)
+{
+    make_room(from);
+    shown.insert(shown.end(), from.shown.begin(), from.shown.end());
+    hidden.insert(hidden.end(), from.hidden.begin(), from.hidden.end());
+    from.shown.clear();
+    from.hidden.clear();
+}
+
 Result<std::unique_ptr<SplatPool>> SplatPool::create(Device& device, uint64_t bytes)
 {
     const uint64_t rows = bytes / kSplatBytes;
@@ -56,13 +71,19 @@ Result<SplatPool::Room> SplatPool::add(const TileIndex& tile, const ScenePoints&
             return room;
         first = gap(rows, used_);
     }
+    // what allocates comes first, so that memory that is short leaves no half of it
+    std::map<uint32_t, uint32_t> used;
+    std::map<TileIndex, Place> placed{{tile, {*first, count}}};
     if (count) {
+        used.emplace(*first, *first + rows);
         SR_CHECK(fill(*first, points, count, options));
-        used_[*first] = *first + rows;
-        staged_.shown.push_back({*first, rows});
     }
+    staged_.make_room({{{*first, rows}}, {{*first, rows}}}); // of these, and of the tile's own of before
+    if (count)
+        staged_.shown.push_back({*first, rows});
+    used_.merge(used);
     remove(tile);
-    places_[tile] = {*first, count};
+    places_.merge(placed);
     splats_ += count;
     return Room::found;
 }
@@ -137,26 +158,24 @@ Status SplatPool::publish()
 {
     SR_CHECK(device_.wait(made_));
     const std::lock_guard lock(mutex_);
-    const auto move = [](std::vector<Rows>& from, std::vector<Rows>& to) {
-        to.insert(to.end(), from.begin(), from.end());
-        from.clear();
-    };
-    move(staged_.shown, published_.shown);
-    move(staged_.hidden, published_.hidden);
+    published_.take(staged_);
     return {};
 }
 
-bool SplatPool::record_updates(VkCommandBuffer commands, const TimelinePoint& done)
+bool SplatPool::record_updates(VkCommandBuffer commands)
 {
-    Changes changes;
     {
         const std::lock_guard lock(mutex_);
-        std::swap(changes, published_);
-        for (const Rows& rows : changes.hidden)
-            leaving_.push_back({rows, done});
+        showing_.take(published_);
+        leaving_.reserve(leaving_.size() + showing_.hidden.size());
     }
-    if (changes.shown.empty() && changes.hidden.empty())
+    // what left before it was ever shown, as nothing was submitted
+    std::erase_if(showing_.shown, [&](const Rows& rows) { return std::ranges::count(showing_.hidden, rows) > 0; });
+    if (showing_.shown.empty() && showing_.hidden.empty())
         return false;
+    next_shown_.clear();
+    for (const Rows& rows : showing_.shown)
+        next_shown_.emplace(rows.first, rows.first + rows.count);
     const BufferSlice blocks = scene_.blocks().slice();
     const VulkanCalls& vk = device_.vk();
     const auto fill = [&](const Rows& rows, uint32_t value) {
@@ -164,17 +183,26 @@ bool SplatPool::record_updates(VkCommandBuffer commands, const TimelinePoint& do
                     rows.count / kBlock * sizeof(uint32_t), value);
     };
     record_entry_barrier(vk, commands);
-    for (const Rows& rows : changes.shown) {
+    for (const Rows& rows : showing_.shown)
         fill(rows, 1);
-        shown_[rows.first] = rows.first + rows.count;
-    }
-    for (const Rows& rows : changes.hidden) {
+    for (const Rows& rows : showing_.hidden)
         fill(rows, 0);
+    record_exit_barrier(vk, commands);
+    return true;
+}
+
+// allocates nothing: record_updates() has
+void SplatPool::updates_are_submitted(const TimelinePoint& done)
+{
+    shown_.merge(next_shown_);
+    const std::lock_guard lock(mutex_);
+    for (const Rows& rows : showing_.hidden) {
+        leaving_.push_back({rows, done});
         shown_.erase(rows.first);
     }
-    record_exit_barrier(vk, commands);
+    showing_.shown.clear();
+    showing_.hidden.clear();
     ++version_;
-    return true;
 }
 
 } // namespace semrover

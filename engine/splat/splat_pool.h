@@ -52,10 +52,13 @@ class SplatPool {
 
     // ---- by the thread that draws, at the same time
 
-    // Records what shows and hides what was published since the last call, with all that follows in the queue after it.
-    // `done` is reached when that has been executed; its semaphore outlives the pool. false: there was nothing
-    bool record_updates(VkCommandBuffer commands, const TimelinePoint& done);
-    // as of the last record_updates():
+    // Records what shows and hides what was published since updates_are_submitted(), with all that follows in the queue
+    // after it. false: there was nothing
+    bool record_updates(VkCommandBuffer commands);
+    // What was recorded last will be executed; `done` is reached then, and its semaphore outlives the pool. Without
+    // this the next record_updates() records it again.
+    void updates_are_submitted(const TimelinePoint& done);
+    // as of the last updates_are_submitted():
     uint32_t end() const { return shown_.empty() ? 0 : shown_.rbegin()->second; } // no row from here on is shown
     uint64_t version() const { return version_; }                                 // moves with every change
 
@@ -66,6 +69,8 @@ class SplatPool {
     };
     struct Changes {
         std::vector<Rows> shown, hidden;
+        void make_room(const Changes& more); // so that adding these allocates nothing
+        void take(Changes& from);            // and empties it; where memory is short, nothing of it
     };
     struct Leaving {
         Rows rows;
@@ -94,7 +99,8 @@ class SplatPool {
     Changes published_;
     std::vector<Leaving> leaving_;
     // of the thread that draws
-    std::map<uint32_t, uint32_t> shown_; // rows: first, end
+    Changes showing_;                                 // not known to be submitted yet
+    std::map<uint32_t, uint32_t> shown_, next_shown_; // rows: first, end; those of showing_
     uint64_t version_ = 0;
 };
 

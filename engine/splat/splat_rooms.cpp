@@ -76,7 +76,8 @@ Result<const SplatScene*> SplatRooms::record(VkCommandBuffer commands, const Sce
     SR_CHECK(check_point_splat_options(options));
     SR_ASSERT(points.size(), "splats of no points");
     SR_TRY(Room * room, room_for(points.size(), options));
-    SR_CHECK(device_.wait(room->busy_until));
+    // a submit that failed reaches nothing
+    SR_CHECK(device_.wait(std::min(room->busy_until, device_.last_ticket())));
     write_rows(points, shown, options.opacity, room->scene.size(), room->upload->mapped());
     const auto [positions, normals, colors, labels, cells, owners] = room->scene.arrays();
     record_entry_barrier(device_.vk(), commands); // the splats of the tile before have been copied

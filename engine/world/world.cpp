@@ -223,7 +223,8 @@ Result<bool> World::step(const JobBudget& budget)
             return scene_ && filled_ ? finish() : Status();
         });
         if (!status) {
-            give_up();
+            if (!filled_) // else it is made, and finished in the next step
+                give_up();
             done = tl::make_unexpected(status.error());
             break;
         }
@@ -263,20 +264,17 @@ Status World::do_piece(Piece piece)
 Status World::load_next()
 {
     const TileIndex tile = loading_.back();
-    loading_.pop_back();
     const auto there = tiles_->load(tile);
     if (!there && there.error().code == kNotYet) {
         waiting_.insert(tile);
-        return {};
+    } else {
+        SR_TRY(const bool stored, there);
+        if (stored)
+            came(tile, loaded_);
+        else
+            not_stored_.insert(tile);
     }
-    SR_CHECK(there.map([](bool) {}));
-    if (!*there) {
-        not_stored_.insert(tile);
-        return {};
-    }
-    ++loaded_;
-    cells_ += tiles_->find(tile)->cells.cells.size();
-    came(tile);
+    loading_.pop_back(); // last: what fails before is tried again
     return {};
 }
 
@@ -294,11 +292,10 @@ Result<std::optional<TileIndex>> World::missing(const TileIndex& tile)
         return std::optional<TileIndex>();
     }
     if (own->finished) {
-        if (std::exchange(own->fresh, false)) {
-            ++loaded_;
-            cells_ += own->cells.cells.size();
+        if (own->fresh) {
             (void)tiles_->keep(tile); // the store's error is stored()
-            came(tile);
+            came(tile, loaded_);
+            own->fresh = false;
         }
         return std::optional<TileIndex>();
     }
@@ -384,9 +381,9 @@ void World::end_look()
     std::swap(work_, found_);
     found_.clear();
     rank_ = done_;
-    idle_ = work_.empty();
-    if (idle_ && splats_ && !foci_.empty())
+    if (work_.empty() && splats_ && !foci_.empty())
         splats_->find_bare(); // those whose neighbours turned out to be empty, too
+    idle_ = work_.empty();
 }
 
 // it is wanted up to a rank, or seen by one that is, or at work
@@ -419,9 +416,9 @@ Status World::drop(const TileIndex& tile)
     if (there.stored)
         not_stored_.erase(tile);
     if (there.finished) {
-        ++dropped_;
         if (splats_)
             splats_->went(tile);
+        ++dropped_;
     }
     if (const auto rank = order_.rank_of(tile))
         ahead_.erase(*rank);
@@ -470,17 +467,15 @@ Status World::cut()
     return {};
 }
 
+// memory may be short at any allocation: it is called again for the tiles that are left
 Status World::finish()
 {
     if (scene_ && !request_.targets.empty())
         put_back(scene_->grid, scene_->part, request_.targets);
     if (!scene_) {
         const Status stored = tiles_->finish(work_, part_);
-        for (const TileIndex& tile : work_) { // they are here, whether or not the store has them
-            ++generated_;
-            cells_ += tiles_->find(tile)->cells.cells.size();
-            came(tile);
-        }
+        for (; !work_.empty(); work_.erase(work_.begin())) // they are here, whether or not the store has them
+            came(work_.front(), generated_);
         if (!stored && !warned_ && callbacks_.warning)
             callbacks_.warning(fmt::format("finished tiles are not kept: {}", stored.error().message));
         warned_ = warned_ || !stored;
@@ -501,12 +496,15 @@ void World::give_up()
     cut_ = filled_ = false;
 }
 
-void World::came(const TileIndex& tile)
+// a tile has points. count: of such tiles
+void World::came(const TileIndex& tile, uint64_t& count)
 {
     if (splats_)
         splats_->came(tile);
     if (const auto rank = order_.rank_of(tile); rank && *rank >= done_)
         ahead_.insert(*rank);
+    ++count;
+    cells_ += tiles_->find(tile)->cells.cells.size();
 }
 
 Status World::check_edits(const LabelEdits& edits) const

@@ -148,7 +148,7 @@ class World {
     Status finish();
     void say(bool ended = false) const;
     void give_up();
-    void came(const TileIndex& tile);
+    void came(const TileIndex& tile, uint64_t& count);
     bool wants_splats() const { return splats_ && splats_->has_work(); }
 
     const WorldRequest request_;

@@ -104,9 +104,9 @@ void WorldSplats::came(const TileIndex& tile)
 
 void WorldSplats::drop(const TileIndex& tile)
 {
+    pool_->remove(tile); // may fail for lack of memory, and then nothing has changed
     stale_.erase(tile);
     made_for_.erase(tile);
-    pool_->remove(tile);
 }
 
 // as it is to be now. One whose neighbours are still to come is not made anew for each of them
@@ -207,6 +207,7 @@ Status WorldSplats::make_next()
         return {};
     }
     const uint32_t wanted = detail(index), coarsest = options_.detail_distance > 0 ? kCoarsestDetail : 0;
+    std::map<TileIndex, MadeFor> made{{index, {wanted, neighbours_with_points(index)}}}; // it may not fail afterwards
     SplatPool::Room room = SplatPool::Room::none;
     for (uint32_t detail = wanted; room == SplatPool::Room::none && detail <= coarsest; ++detail) {
         SR_TRY(room, add(index, *cells, detail));
@@ -216,8 +217,10 @@ Status WorldSplats::make_next()
         no_room_yet_ = true;
         return {};
     }
-    if (room == SplatPool::Room::found)
-        made_for_[index] = {wanted, neighbours_with_points(index)};
+    if (room == SplatPool::Room::found) {
+        made_for_.erase(index);
+        made_for_.merge(made);
+    }
     stale_.erase(index);
     bare_.erase(bare_.begin());
     return {};

@@ -3,11 +3,11 @@
 #pragma once
 
 #include "runtime/base/file.h"
+#include "runtime/base/json_allocator.h"
 #include "runtime/base/result.h"
 
 #include <cstdint>
 #include <functional>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 

@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "runtime/base/json.h"
+
 #include <iosfwd>
-#include <nlohmann/json.hpp>
 #include <string>
 
 namespace semrover {

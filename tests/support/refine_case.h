@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "runtime/base/json.h"
 #include "tests/support/child_program.h"
 #include "tests/support/json_text.h"
 #include "tests/support/program.h"
@@ -10,7 +11,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <unistd.h>
 
 // `refine` of a few small frames with a network of the golden cases

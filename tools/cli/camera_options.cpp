@@ -3,6 +3,7 @@
 #include "tools/cli/camera_options.h"
 
 #include "engine/camera/rig.h"
+#include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/value_options.h"
 #include "tools/dataset/rigid_file.h"
@@ -14,7 +15,6 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 
 namespace semrover {
 

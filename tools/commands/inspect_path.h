@@ -5,7 +5,7 @@
 #include "engine/camera/camera.h"
 #include "tools/commands/scene_input.h"
 
-#include <nlohmann/json.hpp>
+#include "runtime/base/json.h"
 
 namespace semrover {
 

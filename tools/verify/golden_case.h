@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "runtime/base/json.h"
 #include "runtime/base/safetensors.h"
 #include "runtime/device/device.h"
 
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 namespace semrover {
