@@ -53,6 +53,14 @@ std::unique_ptr<FrameHistory> begin()
     return std::move(*history);
 }
 
+template <typename Bytes>
+void add(FrameHistory& history, const Bytes& bytes, const CameraFrame& camera, const DepthPicture& depth)
+{
+    const Status added = history.add(bytes, camera, depth);
+    ASSERT_TRUE(added) << added.error().message;
+    history.keep();
+}
+
 // off the wall's picture without noise, root mean square
 double noise_of(const std::vector<uint8_t>& frame, uint32_t number)
 {
@@ -69,10 +77,10 @@ double noise_of(const std::vector<uint8_t>& frame, uint32_t number)
 TEST(engine_frame_history, keeps_the_first_frame_and_takes_noise_from_the_next_ones)
 {
     const auto history = begin();
-    ASSERT_TRUE(history->add(pixels(0), camera(0), depth(0)));
+    add(*history, pixels(0), camera(0), depth(0));
     EXPECT_EQ(bytes_of(*history), pixels(0));
     for (uint32_t f = 1; f < 6; ++f)
-        ASSERT_TRUE(history->add(pixels(f), camera(f), depth(f)));
+        add(*history, pixels(f), camera(f), depth(f));
     // independent noise falls to (1 - a) / sqrt(1 - a^2) = 0.5 of its deviation; cutting leaves more of it
     EXPECT_NEAR(noise_of(pixels(5), 5), 11.8, 0.5);
     EXPECT_LT(noise_of(bytes_of(*history), 5), 8.5);
@@ -83,15 +91,29 @@ TEST(engine_frame_history, goes_on_from_a_restored_frame_to_the_same_bytes)
     const auto whole = begin(), second = begin();
     std::vector<uint8_t> third;
     for (uint32_t f = 0; f < 5; ++f) {
-        ASSERT_TRUE(whole->add(pixels(f), camera(f), depth(f)));
+        add(*whole, pixels(f), camera(f), depth(f));
         if (f == 2)
             third = bytes_of(*whole);
     }
-    ASSERT_TRUE(second->add(pixels(9), camera(9), depth(9))); // of another chain
+    add(*second, pixels(9), camera(9), depth(9)); // of another chain
     ASSERT_TRUE(second->restore(third, camera(2), depth(2)));
     for (uint32_t f = 3; f < 5; ++f)
-        ASSERT_TRUE(second->add(pixels(f), camera(f), depth(f)));
+        add(*second, pixels(f), camera(f), depth(f));
     EXPECT_EQ(bytes_of(*whole), bytes_of(*second));
+}
+
+TEST(engine_frame_history, what_is_not_kept_is_replaced)
+{
+    const auto whole = begin(), again = begin();
+    for (uint32_t f = 0; f < 4; ++f) {
+        add(*whole, pixels(f), camera(f), depth(f));
+        CameraFrame wide = camera(7);
+        wide.intrinsics.model = CameraModel::fisheye;
+        ASSERT_TRUE(again->add(pixels(8), camera(8), depth(8)));
+        ASSERT_TRUE(again->add(pixels(7), wide, depth(7)));
+        add(*again, pixels(f), camera(f), depth(f));
+    }
+    EXPECT_EQ(bytes_of(*whole), bytes_of(*again));
 }
 
 TEST(engine_frame_history, takes_words_on_the_device_like_pixels_of_the_host)
@@ -101,9 +123,9 @@ TEST(engine_frame_history, takes_words_on_the_device_like_pixels_of_the_host)
     const DeviceTensor words = state.tensor(kBytes / 4, 1, DType::u32, "decoded", 1);
     ASSERT_TRUE(state.allocate(test_device(), "test"));
     for (uint32_t f = 0; f < 3; ++f) {
-        ASSERT_TRUE(host->add(pixels(f), camera(f), depth(f)));
+        add(*host, pixels(f), camera(f), depth(f));
         ASSERT_TRUE(words.write(test_device(), pixels(f)));
-        ASSERT_TRUE(device->add(words, camera(f), depth(f)));
+        add(*device, words, camera(f), depth(f));
     }
     EXPECT_EQ(bytes_of(*host), bytes_of(*device));
 }
@@ -111,15 +133,15 @@ TEST(engine_frame_history, takes_words_on_the_device_like_pixels_of_the_host)
 TEST(engine_frame_history, begins_anew_behind_a_cut_and_behind_another_lens)
 {
     const auto history = begin();
-    ASSERT_TRUE(history->add(pixels(0), camera(0), depth(0)));
+    add(*history, pixels(0), camera(0), depth(0));
     history->restart();
-    ASSERT_TRUE(history->add(pixels(1), camera(1), depth(1)));
+    add(*history, pixels(1), camera(1), depth(1));
     EXPECT_EQ(bytes_of(*history), pixels(1));
     CameraFrame wide = camera(2);
     wide.intrinsics.model = CameraModel::fisheye;
-    ASSERT_TRUE(history->add(pixels(2), wide, depth(2)));
+    add(*history, pixels(2), wide, depth(2));
     EXPECT_EQ(bytes_of(*history), pixels(2));
-    ASSERT_TRUE(history->add(pixels(3), wide, depth(2)));
+    add(*history, pixels(3), wide, depth(2));
     EXPECT_NE(bytes_of(*history), pixels(3));
 }
 

@@ -90,7 +90,7 @@ Result<bool> CameraRenderer::step(const JobBudget& budget)
     const FrameWindow frame{frames_, 1, 0};
     do {
         const FramePart part = part_;
-        Result<bool> done = renderer_->step({part, &chain_, frame, frame});
+        auto done = unless_memory_is_short([&] { return renderer_->step({part, &chain_, frame, frame}); });
         if (done && budget.timed())
             done = device_.wait(device_.last_ticket()).map([&] { return *done; });
         if (!done) {

@@ -314,6 +314,7 @@ Status DeferredRenderer::catch_up(const CameraChain& c, uint32_t frame)
     for (uint32_t f = c.first; f < frame; ++f) {
         SR_CHECK(decode_latents(c, {f, 1, 0}));
         SR_CHECK(accumulate(c, f));
+        chain.history->keep();
     }
     return {};
 }
@@ -332,15 +333,16 @@ Status DeferredRenderer::decode(const FrameTask& t)
     if (c.history > 0)
         SR_CHECK(catch_up(c, t.frame())); // which may decode others: before this one is
     SR_CHECK(decode_latents(c, t.frames));
-    chain.frames.erase(chain.frames.begin(), chain.frames.lower_bound(t.window.first)); // of windows before
     if (c.history > 0) {
         SR_CHECK(accumulate(c, t.frame()));
         SR_CHECK(store_.save_frame(c, t.frame(), chain.history->frame()));
+        chain.history->keep();
         chain.finished = t.frame() + 1;
-        return {};
+    } else {
+        for (uint32_t f = t.frames.next(); f < t.frames.end(); ++f)
+            SR_CHECK(store_.save_frame(c, f, decoder_->bytes(f - t.frames.first)));
     }
-    for (uint32_t f = t.frames.next(); f < t.frames.end(); ++f)
-        SR_CHECK(store_.save_frame(c, f, decoder_->bytes(f - t.frames.first)));
+    chain.frames.erase(chain.frames.begin(), chain.frames.lower_bound(t.window.first)); // of windows before
     return {};
 }
 

@@ -99,26 +99,40 @@ Status FrameHistory::write_pixels(std::span<const uint8_t> pixels)
 Status FrameHistory::accumulate_now(const CameraFrame& camera, const DepthPicture& depth)
 {
     const bool alone = frames_ == 0 || camera.intrinsics.model != camera_.intrinsics.model;
-    CameraPair pair;
-    if (!alone) {
+    added_ = camera;
+    if (frames_ > 0 && !before_) {
         SR_CHECK(copy(memory_.made, memory_.past.bytes));
         SR_CHECK(copy(memory_.now.depth, memory_.past.depth));
-        pair = pair_of(camera, camera_);
-        SR_CHECK(memory_.cameras.write(device_, pair.rows));
+        before_ = true;
     }
     SR_CHECK(memory_.now.depth.write(device_, metres_of(depth)));
-    camera_ = camera;
-    ++frames_;
     if (alone)
         return copy(memory_.now.bytes, memory_.made);
+    const CameraPair pair = pair_of(camera, camera_);
+    SR_CHECK(memory_.cameras.write(device_, pair.rows));
     SR_CHECK(use_lens(pair.model, pair.moving));
     return executable_->run();
+}
+
+void FrameHistory::keep()
+{
+    camera_ = std::move(added_);
+    ++frames_;
+    before_ = false;
+}
+
+void FrameHistory::restart()
+{
+    frames_ = 0;
+    before_ = false;
 }
 
 Status FrameHistory::restore(std::span<const uint8_t> pixels, const CameraFrame& camera, const DepthPicture& depth)
 {
     restart();
-    return add(pixels, camera, depth);
+    SR_CHECK(add(pixels, camera, depth));
+    keep();
+    return {};
 }
 
 } // namespace semrover

@@ -20,18 +20,17 @@ class FrameHistory {
     static Result<std::unique_ptr<FrameHistory>> create(Device& device, const LatentSize& size, CameraModel model,
                                                         float share);
 
-    // The next frame of the chain. The first one stays as it is, and so does one through another lens than the frame
-    // before. bytes: as picture_bytes() makes them, pixels: [height, width, 3]; depth: nothing is infinitely far away
+    // The next frame of the chain, until keep(): what fails may be added again, and what was not kept is replaced. The
+    // first one stays as it is, and so does one through another lens than the frame before. bytes: as picture_bytes()
+    // makes them, pixels: [height, width, 3]; depth: nothing is infinitely far away
     Status add(const DeviceTensor& bytes, const CameraFrame& camera, const DepthPicture& depth);
     Status add(std::span<const uint8_t> pixels, const CameraFrame& camera, const DepthPicture& depth);
-    void restart() { frames_ = 0; } // the next frame has none before it
+    void keep();    // the one that was added last
+    void restart(); // the next frame has none before it
     // a frame that was accumulated before: what comes next goes on from it
     Status restore(std::span<const uint8_t> pixels, const CameraFrame& camera, const DepthPicture& depth);
 
-    const DeviceTensor& frame() const
-    {
-        return memory_.made;
-    } // [picture_words()] u32, of the last one, until the next is added
+    const DeviceTensor& frame() const { return memory_.made; } // [picture_words()] u32, of the one that was added last
 
     // of device memory
     static uint64_t planned_bytes(const DeviceLimits& limits, const LatentSize& size);
@@ -63,8 +62,9 @@ class FrameHistory {
     bool moving_ = false;                      // likewise
     std::unique_ptr<Executable> executable_;
     std::unique_ptr<CopyRing> copies_;
-    CameraFrame camera_; // of the last frame
-    uint32_t frames_ = 0;
+    CameraFrame camera_, added_; // of the last frame that was kept, and of the one that was added
+    uint32_t frames_ = 0;        // that were kept
+    bool before_ = false;        // memory has the last one as the frame before
 };
 
 } // namespace semrover

@@ -49,7 +49,7 @@ static int again(const struct session* s, const char* name, sr_status status, in
     }
     if (status == SR_OK)
         return 0;
-    sr_last_error(strstr(name, "grid") ? NULL : s->context, line, sizeof line);
+    sr_last_error(strstr(name, "grid") && !strstr(name, "of_world") ? NULL : s->context, line, sizeof line);
     if (failed && status == SR_ERR_OUT_OF_MEMORY && (strstr(line, "memory") || strstr(line, "MEMORY")) &&
         !strchr(line, '\n') && attempt == 0) {
         ++refused;
