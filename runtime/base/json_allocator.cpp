@@ -33,7 +33,7 @@ struct Reserve {
             used = 0;
     }
 };
-constinit Reserve reserve{};
+Reserve reserve{};
 
 } // namespace
 
