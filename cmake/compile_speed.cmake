@@ -29,7 +29,8 @@ endif()
 set(cold_options "$<$<CONFIG:Release>:-O1;-Wno-maybe-uninitialized>")
 
 # the headers that cost most of the compile time; every file still includes what it uses
-set(heavy_headers <filesystem> <fmt/format.h> <map> "${CMAKE_SOURCE_DIR}/runtime/base/json_allocator.h" <string> <tl/expected.hpp> <vector> <vulkan/vulkan.h>)
+set(heavy_headers <filesystem> <fmt/format.h> <map> "${CMAKE_SOURCE_DIR}/runtime/base/json_allocator.h" <string>
+    <tl/expected.hpp> <vector> <vulkan/vulkan.h>)
 
 # precompile_headers(TARGET OWNER [HEADER...]): those of OWNER, which has the same options; where that is TARGET, the heavy
 # ones and these
