@@ -124,6 +124,13 @@ TEST(CliEvalFrames, figures_by_distance)
     EXPECT_TRUE(report["distances"][1]["sharpness"].is_null());
     const ProgramResult table = eval(call);
     EXPECT_NE(table.out.find("0 to 6 m"), std::string::npos) << table.out;
+    p.folder.put("true/transforms.json", R"({"depth_unit_scale_factor": 0.002})"); // beside depth/, whichever is named
+    for (const char* folder : {"true", "true/depth"}) {
+        const std::string said = "frames -q --json " + (p / "made") + " " + (p / "true") + " --depth " + (p / folder);
+        const Json far_ones = json_of(eval(said).out)["distances"];
+        EXPECT_EQ(far_ones[0]["pixels"], 0) << folder;
+        EXPECT_EQ(far_ones[1]["pixels"], near["pixels"]) << folder;
+    }
     p.put_depth("small/000000.png", 5000, 25);
     expect_error(eval("frames -q " + (p / "made") + " " + (p / "true") + " --depth " + (p / "small")), 3,
                  "000000.png' is 25 x 16 pixels, expected 24 x 16");

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 
+#include "engine/format/transforms.h"
 #include "runtime/base/quote.h"
 #include "tools/eval/sample_files.h"
 
@@ -50,6 +51,11 @@ Result<FrameFiles> list_frames(const Path& folder, std::string_view kind)
                         quote_path(at->second), quote_path(path));
     }
     return files;
+}
+
+Result<double> depth_unit_of(const Path& folder)
+{
+    return read_depth_unit(folder.filename() == "depth" ? folder.parent_path() : folder);
 }
 
 Status check_names(const FrameFiles& files, const Path& folder, const FrameFiles& other, const Path& other_folder,

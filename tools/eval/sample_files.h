@@ -61,6 +61,9 @@ struct FrameFiles : std::map<std::string, Path> {
 // bad_input: no such folder, none in it, two of one name, and as open_if_shards()
 Result<FrameFiles> list_frames(const Path& folder, std::string_view kind);
 
+// metres of a unit of the depth pictures that list_frames() finds there, as read_depth_unit() says it
+Result<double> depth_unit_of(const Path& folder);
+
 // bad_input unless `other` has a picture of each of these names; `exactly`: and no more
 Status check_names(const FrameFiles& files, const Path& folder, const FrameFiles& other, const Path& other_folder,
                    bool exactly);

@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover eval depth FRAMES TRUTH: how far depths of pictures of equal names are from each other
-#include "engine/format/transforms.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/camera_options.h"
@@ -35,7 +34,7 @@ Result<DepthFolder> list_depth(const Path& folder, const DepthEncoding& encoding
 {
     DepthFolder y{{}, encoding};
     SR_TRY(y.files, list_frames(folder, "depth"));
-    SR_TRY(y.encoding.usual_unit, read_depth_unit(folder.filename() == "depth" ? folder.parent_path() : folder));
+    SR_TRY(y.encoding.usual_unit, depth_unit_of(folder));
     return y;
 }
 

@@ -86,7 +86,7 @@ Result<FlickerInputs> read_inputs(const EvalFlickerArguments& o)
     }
     LensOptions lens = o.lens;
     const Path depth = o.depth;
-    SR_TRY(const double said, read_depth_unit(depth.filename() == "depth" ? depth.parent_path() : depth));
+    SR_TRY(const double said, depth_unit_of(depth));
     in.depth_unit = o.depth_unit.value_or(said);
     SR_TRY(const DepthPicture first, read_depth_frame(in.depth.begin()->second, {}, in.depth_unit));
     if (lens.width == 0)

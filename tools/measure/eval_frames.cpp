@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // semrover eval frames FRAMES TRUTH: how alike pictures of equal names are: PSNR, SSIM and sharpness, also by
 // visibility, class and distance, and LPIPS
-#include "engine/format/transforms.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
@@ -44,7 +43,7 @@ Result<FrameInputs> list_inputs(const EvalFramesArguments& o)
         SR_CHECK(check_names(in.frames, o.frames, *files, *folder, false));
     }
     if (!o.depth.empty()) {
-        SR_TRY(in.depth_unit, read_depth_unit(o.depth));
+        SR_TRY(in.depth_unit, depth_unit_of(o.depth));
     }
     return in;
 }
