@@ -16,7 +16,7 @@ from . import empty_prompt, model_folder, safetensors_file, settings
 from .denoising import alphas_cumprod, ddim_timesteps, denoise, input_of, mean_of_used, noise_of, scheduler_of
 from .draws import draws, generator, number_below, timesteps_at
 from .frames import find_drives, splats_of, to_pixels, write_beside
-from .latents import crop_of, load_vae, sequences, used_of
+from .latents import crop_of, crop_place, load_vae, sequences, used_of
 from .nets.unet import UNet2DConditionModel
 from .trainer import Trainer
 
@@ -56,9 +56,7 @@ class Batches:
         return [torch.stack(parts).to(self.config["device"]) for parts in zip(*rows)]
 
     def _frame(self, s, i, draw):
-        top = number_below(s.truth.shape[2] - self.crop[0] + 1, draw)
-        left = number_below(s.truth.shape[3] - self.crop[1] + 1, draw)
-        place = (slice(None), slice(top, top + self.crop[0]), slice(left, left + self.crop[1]))
+        place = crop_place(s, self.crop, draw)
         low, high = self.config["previous_noise"]
         chance, scale = torch.rand(2, generator=draw).tolist()
         noise = torch.randn(s.truth[0][place].shape, generator=draw)

@@ -13,7 +13,7 @@ from .denoising import SCHEDULER, denoise, mean_of_used, scheduler_of
 from .draws import draws, generator, number_below
 from .frames import find_drives
 from .json_file import read_json
-from .latents import crop_of, sequences, used_of
+from .latents import crop_of, crop_place, sequences, used_of
 from .trainer import Trainer
 
 
@@ -61,8 +61,7 @@ class Pairs:
         return (previous, buffer, visible), truth, *this
 
     def _pair(self, s, i, draw):
-        top, left = (number_below(s.truth.shape[axis] - self.crop[axis - 2] + 1, draw) for axis in (2, 3))
-        place = (slice(None), slice(top, top + self.crop[0]), slice(left, left + self.crop[1]))
+        place = crop_place(s, self.crop, draw)
         noise = torch.randn((2, *s.truth[0][place].shape), generator=draw)
         first = bool(s.first[i])
         before = i if first else i - 1  # whose own drawing is then not used

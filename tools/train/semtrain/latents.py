@@ -11,6 +11,7 @@ import torch
 from . import model_folder, processes, safetensors_file
 from .content import digest, digest_of_pictures
 from .denoising import block_shares
+from .draws import number_below
 from .frames import fill_blocks, to_floats
 from .nets.vae import AutoencoderKL
 from .nets.video_vae import AutoencoderKLTemporalDecoder
@@ -64,6 +65,12 @@ def used_of(sequence, which):
 def crop_of(config, all_sequences):
     """height and width of what a step trains on: config's, or less where a drive's latents are smaller"""
     return tuple(min(most, *(s.truth.shape[axis] for s in all_sequences)) for axis, most in zip((2, 3), config["crop"]))
+
+
+def crop_place(sequence, crop, draw):
+    """an index that cuts a crop of this height and width from latents [..., H, W], somewhere"""
+    top, left = (number_below(size - most + 1, draw) for size, most in zip(sequence.truth.shape[2:], crop))
+    return (..., slice(top, top + crop[0]), slice(left, left + crop[1]))
 
 
 class Encoder:

@@ -17,7 +17,7 @@ from . import model_folder, safetensors_file, settings
 from .denoising import mean_of_used
 from .draws import draws, generator, number_below
 from .frames import find_drives, splats_of, to_pixels, write_beside
-from .latents import crop_of, load_vae, sequences, used_of
+from .latents import crop_of, crop_place, load_vae, sequences, used_of
 from .nets.video_unet import UNetSpatioTemporalConditionModel
 from .trainer import Trainer
 from .video_denoising import (SCHEDULER, denoise_window, timestep_of, velocity_target, video_input, window_denoiser)
@@ -71,9 +71,7 @@ class Batches:
         return [torch.stack(parts).to(self.config["device"]) for parts in zip(*rows)]
 
     def _window(self, s, i, draw):
-        top = number_below(s.truth.shape[2] - self.crop[0] + 1, draw)
-        left = number_below(s.truth.shape[3] - self.crop[1] + 1, draw)
-        place = (..., slice(top, top + self.crop[0]), slice(left, left + self.crop[1]))
+        place = crop_place(s, self.crop, draw)
         truth, buffer, visible = (of[i:i + self.frames][place] for of in (s.truth, s.buffer, s.visible))
         if float(torch.rand(1, generator=draw)) < self.config["dropout"]:
             visible = torch.zeros_like(visible)
