@@ -7,10 +7,14 @@ option(SEMROVER_UNITY "compile some eight sources at a time: less than half the 
 
 find_program(CCACHE ccache)
 if(CCACHE)
-    # what ccache asks for to cache users of precompiled headers
-    set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE})
+    # what ccache asks for to cache users of precompiled headers; and no path of this checkout in what it compares, so that
+    # another checkout takes the same results
+    set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros
+        CCACHE_BASEDIR=${CMAKE_SOURCE_DIR} CCACHE_NOHASHDIR=1 ${CCACHE})
+    set(CMAKE_C_COMPILER_LAUNCHER ${CMAKE_CXX_COMPILER_LAUNCHER})
     add_compile_options($<$<COMPILE_LANG_AND_ID:CXX,GNU>:-fpch-preprocess>)
 endif()
+add_compile_options(-fmacro-prefix-map=${CMAKE_SOURCE_DIR}/=) # __FILE__ is a path within the repository
 find_program(LLD ld.lld)
 if(LLD AND NOT WIN32)
     add_link_options(-fuse-ld=lld)

@@ -250,11 +250,12 @@ typedef struct sr_model_desc {
      * not 0 gives up: sr_model_load returns SR_ERR_INTERRUPTED. NULL: none */
     uint32_t (*progress)(void* user, uint64_t done, uint64_t total);
     void* user; /* for the callback */
+    const char* preset; /* of the voxfield transformer: one of `presets` in model_index.json; NULL: none */
 } sr_model_desc;
 
 /* Reads the weights and copies them to the device: waits for the disk and the device, seconds for a large model. Where
  * sr_context_desc.max_bytes has no room for both networks of a renderer, sr_renderers load them in turn. context:
- * outlives the model. On failure *model is NULL, and nothing stays on the device. SR_ERR_USAGE: a NULL, files;
+ * outlives the model. On failure *model is NULL, and nothing stays on the device. SR_ERR_USAGE: a NULL, files, preset;
  * SR_ERR_BAD_INPUT: the model's files; SR_ERR_OUT_OF_MEMORY, SR_ERR_INTERRUPTED. */
 SR_API sr_status sr_model_load(sr_context* context, const sr_model_desc* desc, sr_model** model);
 

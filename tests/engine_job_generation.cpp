@@ -290,6 +290,45 @@ TEST(engine_job_generation, warns_where_points_were_placed_in_another_way_than_t
     EXPECT_EQ(said.size(), 1u);
 }
 
+TEST(engine_job_generation, a_preset_is_other_defaults_and_another_adapter)
+{
+    const ScratchFolder folder;
+    std::filesystem::copy(options().model, folder / "voxfield_transformer");
+    folder.put("model_index.json", R"({
+        "defaults": {"num_inference_steps": 4, "guidance_scale": 1, "distilled_steps": 4, "jump_length": 2},
+        "presets": {"quality": {"adapter": "quality.safetensors", "num_inference_steps": 16, "guidance_scale": 2.25,
+                                "distilled_steps": null}}})");
+    const auto resolved = [&](const std::string& preset) {
+        GenerationOptions o;
+        o.model = folder.path();
+        o.preset = preset;
+        return resolve_generation(o);
+    };
+    EXPECT_EQ(resolved("")->steps, 4);
+    EXPECT_TRUE(resolved("")->model.adapter.empty());
+    const auto none = resolved("fast"), missing = resolved("quality");
+    ASSERT_FALSE(none || missing);
+    EXPECT_EQ(none.error().code, ErrorCode::usage);
+    EXPECT_EQ(none.error().message, "no preset of the model is called 'fast'; choose from quality");
+    EXPECT_EQ(missing.error().code, ErrorCode::bad_input);
+    folder.put("voxfield_transformer/quality.safetensors", "");
+    const auto quality = resolved("quality");
+    ASSERT_TRUE(quality) << quality.error().message;
+    EXPECT_EQ(quality->model.adapter, folder / "voxfield_transformer/quality.safetensors");
+    EXPECT_EQ(quality->steps, 16);
+    EXPECT_EQ(quality->guidance.scale, 2.25f);
+    EXPECT_EQ(quality->repaint.jump_length, 2) << "as in the defaults";
+    EXPECT_TRUE(quality->model.warnings.empty()) << "it is not distilled";
+    for (const char* odd :
+         {R"({"presets": {"quality": {"adapter": "../quality.safetensors"}}})", "[]", R"({"presets": 3})",
+          R"({"presets": {"quality": {"adapter": 3}}})", R"({"defaults": 3, "presets": {"quality": {}}})"}) {
+        folder.put("model_index.json", odd);
+        const auto refused = resolved("quality");
+        ASSERT_FALSE(refused) << odd;
+        EXPECT_EQ(refused.error().code, ErrorCode::bad_input) << odd;
+    }
+}
+
 TEST(engine_job_generation, warns_where_a_distilled_model_is_sampled_in_another_way_than_it_was_trained_for)
 {
     const ScratchFolder folder;

@@ -263,15 +263,6 @@ TEST(Repaint, EveryRowHasItsOwnDrawAndEveryTimestepIsListedOnce)
         EXPECT_EQ(plan.rows[i].draw, i);
 }
 
-TEST(Repaint, PresetsAreThoseOfTheMethod)
-{
-    EXPECT_EQ(repaint_preset("fast")->steps, 20);
-    EXPECT_EQ(repaint_preset("standard")->repaint.jump_length, 5);
-    EXPECT_EQ(repaint_preset("paper")->sampler, Sampler::ddpm);
-    EXPECT_EQ(repaint_preset("slow").error().code, ErrorCode::usage);
-    EXPECT_EQ(plan_of(ddpm(), repaint_preset("standard")->steps, repaint_preset("standard")->repaint).evaluations, 95u);
-}
-
 TEST(Repaint, PlansThatCannotBeAreRefused)
 {
     EXPECT_FALSE(plan_sampling(ddpm(), 0));

@@ -63,7 +63,7 @@ RegionOptions options(RegionStrategy strategy = RegionStrategy::complete)
 void generate(VoxelGrid& grid, uint32_t batch, const RegionOptions& regions = options())
 {
     GenerationSettings settings;
-    settings.model = *VoxfieldModel::open(kModel, Sampler::ddpm);
+    settings.model = *VoxfieldModel::open(kModel, {}, Sampler::ddpm);
     settings.plan = *plan_sampling(settings.model.scheduler, 2);
     settings.guidance.scale = 2;
     settings.batch = batch;

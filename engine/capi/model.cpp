@@ -40,6 +40,7 @@ Result<ModelRequest> request_of(const sr_model_desc& d)
         SR_TRY(request.files, folder_of(d));
         request.path = d.path ? request.files->path() / d.path : request.files->path();
     }
+    request.preset = d.preset ? d.preset : "";
     request.precision = d.precision == SR_FP32 ? DType::f32 : DType::f16;
     if (d.parts) {
         request.if_there = false;
@@ -160,4 +161,4 @@ sr_status sr_model_get_info(const sr_model* model, sr_model_info* info)
 
 } // extern "C"
 
-static_assert(sizeof(sr_file) == 24 && sizeof(sr_model_desc) == 64 && sizeof(sr_model_info) == 56);
+static_assert(sizeof(sr_file) == 24 && sizeof(sr_model_desc) == 72 && sizeof(sr_model_info) == 56);

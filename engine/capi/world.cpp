@@ -115,6 +115,7 @@ Result<GenerationSettings> settings_of(const sr_world_desc& d, const Model& mode
         SR_TRY(o, options_of(generation));
     }
     o.model = model.path();
+    o.preset = model.preset();
     o.precision = model.precision();
     if (d.steps)
         o.steps = int(d.steps);

@@ -174,7 +174,8 @@ DrawingStore::DrawingStore(RunFolder run, const CameraPath& path, const DrawnFil
       record_(run_, [this](const std::string& piece) { return files_of(piece); })
 {
     for (const Json& entry : run_.entries())
-        if (files_.boxes && entry.is_object() && entry.contains("piece") && entry.value(kBoxes, Json()).is_string())
+        if (files_.boxes && entry.is_object() && entry.value("piece", Json()).is_string() &&
+            entry.value(kBoxes, Json()).is_string())
             files_.boxes->keep(entry.value("piece", ""), entry.value(kBoxes, ""));
 }
 

@@ -41,7 +41,7 @@ Status Model::open(Device& device)
                     "diffusers layout",
                     path.string());
     if (request_.voxfield && (all || has_voxfield(path))) {
-        SR_TRY(voxfield_, VoxfieldModel::open(path));
+        SR_TRY(voxfield_, VoxfieldModel::open(path, request_.preset));
         bytes_ += TransformerWeights(voxfield_->config, precision()).device_bytes(device.limits());
     }
     if (request_.renderer && (all || has_renderer(path))) {
@@ -67,7 +67,7 @@ Status Model::upload(Device& device, const Progress& progress)
     const LoadProgress added = [&](uint64_t bytes) { return say(done + bytes); };
     SR_CHECK(say(0));
     if (voxfield_) {
-        SR_TRY(transformer_, Transformer::load(device, voxfield_->transformer, precision(), added));
+        SR_TRY(transformer_, Transformer::load(device, voxfield_->transformer, precision(), voxfield_->adapter, added));
     }
     // without room for both they are loaded in turn, by who renders
     if (renderer_ && (!device.budget() || device.allocated_bytes() + renderer_bytes_ <= device.budget()))

@@ -12,6 +12,7 @@ namespace semrover {
 struct ModelRequest {
     Path path; // a folder; of a renderer alone a .safetensors file of the LDM layout, too
     std::unique_ptr<MemoryFolder> files = {}; // that `path` leads into, where the caller has it in memory
+    std::string preset = {};                  // of the voxfield transformer; empty: none
     DType precision = DType::f16;
     bool voxfield = true, renderer = true; // what is loaded of it
     bool if_there = true;                  // what the folder has of these, one of them at least; else all of them
@@ -29,6 +30,7 @@ class Model {
     static Result<std::shared_ptr<Model>> load(Device& device, ModelRequest request, const Progress& progress = {});
 
     const Path& path() const { return request_.path; }
+    const std::string& preset() const { return request_.preset; }
     DType precision() const { return request_.precision; }
     uint64_t device_bytes() const { return bytes_; } // of all weights
 

@@ -33,12 +33,23 @@ bool is_matrix(const TensorInfo& tensor)
 
 } // namespace
 
-Result<LowRankAdapter> LowRankAdapter::open_folder(const Path& folder)
+Result<std::string> preset_adapter(const Json& preset)
+{
+    const auto found = preset.find("adapter");
+    if (found == preset.end() || found->is_null())
+        return kAdapterFile;
+    const std::string name = found->is_string() ? found->get<std::string>() : std::string();
+    if (name.empty() || name.find_first_of("/\\") != std::string::npos)
+        return fail(ErrorCode::bad_input, "model_index.json: presets: adapter: expected the name of a file");
+    return name;
+}
+
+Result<LowRankAdapter> LowRankAdapter::open(const Path& path)
 {
     LowRankAdapter adapter;
-    if (!is_there(folder / kAdapterFile))
+    if (!is_there(path))
         return adapter;
-    SR_TRY(SafetensorsSet file, SafetensorsSet::open(folder / kAdapterFile));
+    SR_TRY(SafetensorsSet file, SafetensorsSet::open(path));
     SR_CHECK(check_finite(file));
     std::vector<std::string> odd;
     for (const TensorInfo& tensor : file.tensors()) {

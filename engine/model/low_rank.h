@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "runtime/base/json.h"
 #include "runtime/base/safetensors.h"
 
 #include <map>
@@ -10,13 +11,16 @@ namespace semrover {
 
 constexpr const char* kAdapterFile = "pytorch_lora_weights.safetensors"; // as diffusers calls it
 
+// The file that a preset of model_index.json names, the usual one where it names none. bad_input: no name of a file
+Result<std::string> preset_adapter(const Json& preset);
+
 // A low-rank adapter (LoRA, Hu et al. 2021, arXiv 2106.09685): what is added to some of a network's matrices. For
 // NAME.weight [N, K] the file has NAME.lora_A.weight [r, K] and NAME.lora_B.weight [N, r]; B A is added. The rank r may
 // differ from matrix to matrix.
 class LowRankAdapter {
   public:
-    // of a component's folder; empty where the folder has no such file. bad_input: a file that is damaged
-    static Result<LowRankAdapter> open_folder(const Path& folder);
+    // empty where there is no such file. bad_input: a file that is damaged
+    static Result<LowRankAdapter> open(const Path& path);
 
     // bad_input: one line lists tensors that are no such pair, and what belongs to no matrix of the schema or does not
     // fit it

@@ -61,12 +61,12 @@ Transformer::Transformer(const TransformerConfig& config, DType precision)
 }
 
 Result<std::unique_ptr<Transformer>> Transformer::load(Device& device, const Path& folder, DType precision,
-                                                       const LoadProgress& progress)
+                                                       const Path& named, const LoadProgress& progress)
 {
     SR_TRY(const TransformerConfig config, read_transformer_config(folder));
     SR_TRY(const SafetensorsSet file, SafetensorsSet::open_folder(folder));
     std::unique_ptr<Transformer> t(new Transformer(config, precision));
-    SR_TRY(const LowRankAdapter adapter, LowRankAdapter::open_folder(folder));
+    SR_TRY(const LowRankAdapter adapter, LowRankAdapter::open(named.empty() ? folder / kAdapterFile : named));
     SR_CHECK(t->weights_.load(device, file, adapter, progress));
     SR_CHECK(t->upload_frequencies(device));
     return t;

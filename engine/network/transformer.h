@@ -52,9 +52,10 @@ struct Conditioned {
 // to a graph; D = heads * head_dim, C = 6 * points, M tokens of all sets.
 class Transformer {
   public:
-    // reads config.json and the weights of a voxfield_transformer folder, and its adapter if there is one
+    // reads config.json and the weights of a voxfield_transformer folder, and an adapter: the one that is named, or the
+    // folder's own if there is one
     static Result<std::unique_ptr<Transformer>> load(Device& device, const Path& folder, DType precision,
-                                                     const LoadProgress& progress = {});
+                                                     const Path& adapter = {}, const LoadProgress& progress = {});
     // random weights of a config, for benchmarks
     static Result<std::unique_ptr<Transformer>> random(Device& device, const TransformerConfig& config,
                                                        DType precision);

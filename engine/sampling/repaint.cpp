@@ -25,17 +25,6 @@ StepCoefficients undo_step(const StepCoefficients& from, const StepCoefficients&
 
 } // namespace
 
-Result<RepaintPreset> repaint_preset(std::string_view name)
-{
-    if (name == "fast")
-        return RepaintPreset{20, {1, 1}, {}};
-    if (name == "standard")
-        return RepaintPreset{50, {5, 2}, {}};
-    if (name == "paper")
-        return RepaintPreset{250, {10, 10}, Sampler::ddpm};
-    return fail(ErrorCode::usage, "no preset is called \"{}\", choose from fast, standard, paper", name);
-}
-
 Result<std::vector<int>> repaint_levels(int steps, const RepaintOptions& options)
 {
     const int length = options.jump_length, count = options.jump_n_sample;

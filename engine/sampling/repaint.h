@@ -25,15 +25,6 @@ struct RepaintOptions {
     KnownTokens known = KnownTokens::noised;
 };
 
-struct RepaintPreset {
-    int steps = 0;
-    RepaintOptions repaint;
-    std::optional<Sampler> sampler; // none: the model's own
-};
-
-// "fast" 20 steps 1/1, "standard" 50 steps 5/2, "paper" 250 steps 10/10 with DDPM; another name is a usage error
-Result<RepaintPreset> repaint_preset(std::string_view name);
-
 constexpr size_t kMaxPlanRows = 1'000'000;
 
 // Levels visited by RePaint, `steps` - 1 the noisiest and 0 the last, as in diffusers' RePaintScheduler (which

@@ -2,15 +2,30 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/voxfield/voxfield_model.h"
 
+#include "engine/model/low_rank.h"
 #include "runtime/base/json_fields.h"
+#include "runtime/base/quote.h"
 
 namespace semrover {
 
 namespace {
 
-Status read_defaults(const Json& index, VoxfieldDefaults& d)
+Result<Json> preset_of(const Json& index, const std::string& name)
 {
-    const Json defaults = index.value("defaults", Json::object());
+    const Json presets = index.value("presets", Json::object());
+    if (!presets.is_object())
+        return fail(ErrorCode::bad_input, "model_index.json: presets: expected an object");
+    if (const auto found = presets.find(name); found != presets.end() && found->is_object())
+        return *found;
+    std::vector<std::string> names;
+    for (const auto& [other, settings] : presets.items())
+        names.push_back(other);
+    return fail(ErrorCode::usage, "no preset of the model is called {}; {}", quote(name),
+                names.empty() ? "it has none" : fmt::format("choose from {}", fmt::join(names, ", ")));
+}
+
+Status read_defaults(const Json& defaults, VoxfieldDefaults& d)
+{
     JsonFields fields(defaults, "model_index.json: defaults");
     fields.integer("num_inference_steps", 1, kMaxInferenceSteps, d.num_inference_steps);
     int from = 0, until = kLastTimestep;
@@ -46,7 +61,7 @@ SchedulerConfig method_scheduler(std::optional<Sampler> sampler)
 
 } // namespace
 
-Result<VoxfieldModel> VoxfieldModel::open(const Path& folder, std::optional<Sampler> sampler)
+Result<VoxfieldModel> VoxfieldModel::open(const Path& folder, const std::string& preset, std::optional<Sampler> sampler)
 {
     VoxfieldModel m;
     m.folder = folder;
@@ -59,10 +74,26 @@ Result<VoxfieldModel> VoxfieldModel::open(const Path& folder, std::optional<Samp
                     folder.string());
     SR_TRY(m.config, read_transformer_config(m.transformer));
     m.warnings = m.config.warnings;
+    Json index = Json::object();
     if (is_there(folder / "model_index.json")) {
-        SR_TRY(const Json index, read_json(folder / "model_index.json"));
-        SR_CHECK(read_defaults(index, m.defaults));
+        SR_TRY(index, read_json(folder / "model_index.json"));
     }
+    if (!index.is_object())
+        return fail(ErrorCode::bad_input, "{}: expected an object, found {}", quote_path(folder / "model_index.json"),
+                    index.type_name());
+    Json defaults = index.value("defaults", Json::object());
+    if (!preset.empty()) {
+        SR_TRY(const Json settings, preset_of(index, preset));
+        SR_TRY(const std::string adapter, preset_adapter(settings));
+        if (adapter != kAdapterFile)
+            m.adapter = m.transformer / adapter;
+        if (!m.adapter.empty() && !is_file(m.adapter))
+            return fail(ErrorCode::bad_input, "{} is not there, the adapter of the preset {}", quote_path(m.adapter),
+                        quote(preset));
+        if (defaults.is_object())
+            defaults.update(settings);
+    }
+    SR_CHECK(read_defaults(defaults, m.defaults));
     const Path scheduler = folder / "voxfield_scheduler" / "scheduler_config.json";
     m.scheduler = method_scheduler(sampler);
     if (is_there(scheduler)) {

@@ -24,13 +24,16 @@ struct VoxfieldDefaults {
 struct VoxfieldModel {
     Path folder;
     Path transformer; // the component's folder
+    Path adapter;     // of a preset, in place of that folder's own; else empty
     TransformerConfig config;
     SchedulerConfig scheduler;
     VoxfieldDefaults defaults;
     std::vector<std::string> warnings;
 
-    // errors: bad_input, with what is missing and where it should be
-    static Result<VoxfieldModel> open(const Path& folder, std::optional<Sampler> sampler = {});
+    // preset: one of "presets" in model_index.json, other defaults and maybe another adapter; empty: none of them.
+    // Errors: usage (no preset of that name); bad_input, with what is missing and where it should be
+    static Result<VoxfieldModel> open(const Path& folder, const std::string& preset = {},
+                                      std::optional<Sampler> sampler = {});
 };
 
 } // namespace semrover

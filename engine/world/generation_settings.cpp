@@ -45,27 +45,20 @@ Result<GenerationSettings> resolve_generation(const GenerationOptions& o)
 {
     GenerationSettings s;
     std::optional<Sampler> sampler;
-    RepaintPreset preset;
-    if (!o.preset.empty()) {
-        SR_TRY(preset, repaint_preset(o.preset));
-        sampler = preset.sampler;
-    }
     if (!o.sampler.empty()) {
         SR_TRY(sampler, sampler_from_name(o.sampler));
     }
-    SR_TRY(s.model, VoxfieldModel::open(o.model, sampler));
+    SR_TRY(s.model, VoxfieldModel::open(o.model, o.preset, sampler));
     const double model_eta = s.model.scheduler.eta;
     s.model.scheduler.eta = o.eta.value_or(model_eta);
     s.other_eta = s.model.scheduler.eta != model_eta;
     const VoxfieldDefaults& d = s.model.defaults;
-    s.steps = o.steps.value_or(preset.steps ? preset.steps : d.num_inference_steps);
+    s.steps = o.steps.value_or(d.num_inference_steps);
     s.guidance = {o.guidance_scale.value_or(d.guidance.scale), double(o.guidance_from.value_or(int(d.guidance.from))),
                   double(o.guidance_until.value_or(int(d.guidance.until))),
                   o.guidance_radius.value_or(d.guidance.radius)};
-    s.repaint = preset.steps ? preset.repaint : d.repaint;
-    s.repaint.jump_length = o.jump_length.value_or(s.repaint.jump_length);
-    s.repaint.jump_n_sample = o.jump_n_sample.value_or(s.repaint.jump_n_sample);
-    s.repaint.known = o.known.value_or(d.repaint.known);
+    s.repaint = {o.jump_length.value_or(d.repaint.jump_length), o.jump_n_sample.value_or(d.repaint.jump_n_sample),
+                 o.known.value_or(d.repaint.known)};
     s.regions = d.regions;
     s.regions.region_size = o.region_size.value_or(d.regions.region_size);
     s.regions.coverage_threshold =
@@ -118,6 +111,8 @@ Result<Json> settings_json(const GenerationSettings& s, const Device& device, st
         settings["scheduler"] = hash_text(scheduler_hash);
     }
     // not there where they say nothing
+    if (!s.model.adapter.empty())
+        settings["adapter"] = s.model.adapter.filename().string();
     if (s.guidance.until < kLastTimestep)
         settings["guidance_until"] = s.guidance.until;
     if (s.guidance.narrows(s.model.config.attention_radius))

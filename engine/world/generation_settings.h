@@ -16,11 +16,10 @@ namespace semrover {
 
 constexpr double kUsualTileSize = 9.6; // metres: 16 voxels of the usual size
 
-// How a grid is filled with points, as far as the caller says so; what is missing comes from the preset, then from the
-// model.
+// How a grid is filled with points, as far as the caller says so; what is missing comes from the model.
 struct GenerationOptions {
     Path model;                  // a folder
-    std::string sampler, preset; // names; empty: the model's
+    std::string sampler, preset; // names; empty: the model's, and none
     std::optional<int> steps, region_size, coverage_threshold, jump_length, jump_n_sample;
     std::optional<float> guidance_scale;
     std::optional<int> guidance_from, guidance_until;

@@ -58,7 +58,8 @@ Status GridFilling::load(uint64_t seed, const JobCallbacks& callbacks)
             if (callbacks.warning)
                 callbacks.warning(warning);
     if (!transformer_) {
-        SR_TRY(transformer_, Transformer::load(device_, settings_.model.transformer, settings_.precision));
+        SR_TRY(transformer_,
+               Transformer::load(device_, settings_.model.transformer, settings_.precision, settings_.model.adapter));
     }
     if (!sampler_ || seed_ != seed) {
         sampler_.reset(); // its memory goes before the next one's comes

@@ -73,6 +73,7 @@ void model_folder(Bytes input)
 {
     const InputFolder folder(input, "model_index.json");
     (void)accepts(VoxfieldModel::open(folder));
+    (void)accepts(VoxfieldModel::open(folder, "quality"));
     if (const auto model = RendererModel::read(folder); accepts(model)) {
         (void)accepts(model->open_unet());
         (void)accepts(model->open_vae());
@@ -84,7 +85,7 @@ void adapter(Bytes input)
 {
     const InputFile file(input, kAdapterFile);
     const std::vector<TensorSpec> schema = {{"a.weight", {4, 3}}, {"b.weight", {2, 2}}};
-    const auto read = LowRankAdapter::open_folder(Path(file).parent_path());
+    const auto read = LowRankAdapter::open(file);
     if (!accepts(read) || !accepts(read->require(schema)))
         return;
     std::vector<float> values(12);

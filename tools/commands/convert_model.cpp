@@ -141,8 +141,21 @@ Status plan_transformer(const ConvertModelOptions& o, const Path& folder, Conver
     put_in_blocks(o, files);
     plan.index["voxfield_transformer"] = {"semrover", "VoxfieldTransformer"};
     plan.components["voxfield_transformer"] = std::move(files);
-    if (is_there(folder / kAdapterFile))
-        plan.copies[std::string("voxfield_transformer/") + kAdapterFile] = folder / kAdapterFile;
+    return {};
+}
+
+// the one beside the weights, and those that presets name
+Status copy_adapters(const Path& folder, Conversion& plan)
+{
+    Json presets = plan.index.value("presets", Json::object());
+    if (!presets.is_object())
+        presets = Json::object();
+    presets[""] = Json::object();
+    for (const Json& preset : presets) {
+        SR_TRY(const std::string name, preset_adapter(preset));
+        if (is_file(folder / name))
+            plan.copies["voxfield_transformer/" + name] = folder / name;
+    }
     return {};
 }
 
@@ -163,8 +176,10 @@ Status plan_copies(const Path& in, Conversion& plan)
         if (index.is_object() && index.contains(component))
             plan.index[component] = index[component];
     }
-    if (index.is_object() && index.contains("defaults"))
-        plan.index["defaults"] = index["defaults"];
+    for (const char* settings : {"defaults", "presets"})
+        if (index.is_object() && index.contains(settings))
+            plan.index[settings] = index[settings];
+    SR_CHECK(copy_adapters(in / "voxfield_transformer", plan));
     static constexpr const char* kKnown[] = {"renderer",           "unet",      "vae",         "voxfield_transformer",
                                              "voxfield_scheduler", "scheduler", "conditioning"};
     std::error_code ignored;
@@ -244,8 +259,7 @@ Status write_conversion(Conversion& plan, const Path& out, const Globals& global
     }
     if (plan.text) {
         SR_CHECK(make_folder(folder / "conditioning"));
-        SR_CHECK(stream_safetensors(folder / "conditioning" / "conditioning.safetensors",
-                                    std::span(&*plan.text, 1)));
+        SR_CHECK(stream_safetensors(folder / "conditioning" / "conditioning.safetensors", std::span(&*plan.text, 1)));
     }
     SR_CHECK(write_json(folder / "model_index.json", plan.index));
     SR_CHECK(folder.commit());

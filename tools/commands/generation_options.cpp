@@ -32,8 +32,7 @@ void add_generation_options(CLI::App& c, GenerationArguments& a)
                "metres beyond which voxels without labels see no others: guidance towards what neighbors agree on", 0,
                kWholeRadius);
     add_choice(c, "--sampler", {"ddpm", "ddim", "dpm++2m"}, "of the noise schedule", o.sampler);
-    add_choice(c, "--preset", {"fast", "standard", "paper"},
-               "fast (20 steps), standard (50, RePaint 5/2), paper (250, RePaint 10/10, DDPM)", o.preset);
+    c.add_option("--preset", o.preset, "of the model's, in place of its defaults (docs/models.md)");
     add_number(c, "--jump-length", o.jump_length, "RePaint: steps of a jump back", 0, 10000);
     add_number(c, "--jump-n-sample", o.jump_n_sample, "RePaint: passes over each jump", 1, 10000);
     add_choice(c, "--known-tokens", {"noised", "clean"},

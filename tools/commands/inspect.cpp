@@ -305,6 +305,8 @@ Result<Report> describe_folder(const Path& folder, bool with_tensors)
         report["class"] = index.value("_class_name", Json());
         if (index.contains("defaults"))
             report["defaults"] = described_defaults(index["defaults"]);
+        if (index.contains("presets"))
+            report["presets"] = index["presets"];
         SR_TRY(report["components"], describe_components(folder, index, with_tensors, totals));
         describe_video(report, folder);
     } else if (is_there(folder / "config.json") || is_there(folder / "scheduler_config.json")) {

@@ -170,7 +170,7 @@ Result<Json> generate_targets(const Regeneration& what, const RegenerationArgume
     SR_TRY(const GenerationSettings generation, resolve_generation(o.generation.options));
     SR_TRY(const auto device, open_device(globals, o.generation.profile));
     SR_TRY(std::shared_ptr<const Transformer> transformer,
-           Transformer::load(*device, generation.model.transformer, generation.precision));
+           Transformer::load(*device, generation.model.transformer, generation.precision, generation.model.adapter));
     SR_TRY(const uint64_t input, hash_file(what.input));
     SR_TRY(Json settings, settings_json(generation, *device, what.command, input));
     settings["request"] = what.request;

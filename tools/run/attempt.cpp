@@ -146,9 +146,9 @@ bool Attempt::adopt(const Path& run, const std::string& device, const std::strin
         if (!summary || !summary->is_object() || !summary->value("settings", Json()).is_object())
             continue;
         const Json& settings = (*summary)["settings"];
-        if (settings.value("device", "") != device || settings.value("driver", "") != driver) {
+        if (settings.value("device", Json()) != device || settings.value("driver", Json()) != driver) {
             say(fmt::format("{} is of another device, {}: it is not gone on with", quote_path(other),
-                            quote(settings.value("device", ""))));
+                            json_text(settings.value("device", Json()))));
             continue;
         }
         take_run(other / "work", work_);

@@ -19,6 +19,8 @@ Result<GoldenCase> GoldenCase::open(const Path& folder)
     c.folder_ = folder;
     c.name_ = folder.filename().empty() ? folder.parent_path().filename().string() : folder.filename().string();
     c.kind_ = json["kind"];
+    const nlohmann::json model = json.value("model", nlohmann::json());
+    c.model_ = model.is_string() ? model.get<std::string>() : "model";
     c.params_ = json.value("params", nlohmann::json::object());
     c.tolerance_ = json.value("tolerance", nlohmann::json::object());
     if (!c.params_.is_object() || !c.tolerance_.is_object())

@@ -19,7 +19,7 @@ class GoldenCase {
     const std::string& name() const { return name_; }
     const std::string& kind() const { return kind_; }
     const nlohmann::json& params() const { return params_; }
-    Path model() const { return folder_ / "model"; }
+    Path model() const { return folder_ / model_; }
 
     bool has(const std::string& tensor) const { return tensors_.find(tensor) != nullptr; }
     std::vector<uint64_t> shape(const std::string& tensor) const;
@@ -39,7 +39,7 @@ class GoldenCase {
     explicit GoldenCase(Safetensors tensors) : tensors_(std::move(tensors)) {}
 
     Path folder_;
-    std::string name_, kind_;
+    std::string name_, kind_, model_;
     nlohmann::json params_, tolerance_;
     Safetensors tensors_;
 };

@@ -171,8 +171,8 @@ Result<GoldenOutputs> run_voxfield_sampling(Device& device, const GoldenCase& c,
     nlohmann::json scheduler = c.params();
     scheduler["_class_name"] = "DDPMScheduler";
     scheduler["prediction_type"] = "sample";
-    scheduler["timestep_spacing"] = "leading";
-    scheduler["variance_type"] = "fixed_small";
+    scheduler.emplace("timestep_spacing", "leading");
+    scheduler.emplace("variance_type", "fixed_small");
     std::vector<std::string> warnings;
     SR_TRY(const SchedulerConfig config, scheduler_config_from_json(scheduler, warnings));
     SR_TRY(const double steps, c.number("steps"));

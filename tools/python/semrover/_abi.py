@@ -120,7 +120,8 @@ class sr_model_desc(Structure):
                 ("precision", c_uint32),
                 ("reserved", c_uint32),
                 ("progress", CFUNCTYPE(c_uint32, c_void_p, c_uint64, c_uint64)),
-                ("user", c_void_p)]
+                ("user", c_void_p),
+                ("preset", c_char_p)]
 
 
 class sr_model_info(Structure):

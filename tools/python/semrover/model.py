@@ -33,13 +33,15 @@ class Model(Handle):
 
     path: a folder, or a renderer's .safetensors file. parts: VOXFIELD, RENDERER or both, which must be there; 0: what
     there is. precision: "fp16" or "fp32". progress(done, total), bytes: what is not None and not 0 gives up
-    (InterruptedError); an exception in it is raised here.
+    (InterruptedError); an exception in it is raised here. preset: one of `presets` in model_index.json.
     """
 
-    def __init__(self, context, path, parts=0, precision="fp16", progress=None):
+    def __init__(self, context, path, parts=0, precision="fp16", progress=None, preset=None):
         if precision not in _PRECISIONS:
             raise ValueError(f"precision: expected one of {', '.join(_PRECISIONS)}, found {precision!r}")
         desc = made(_abi.sr_model_desc, parts=parts, path=os.fsencode(path), precision=_PRECISIONS[precision])
+        if preset is not None:
+            desc.preset = os.fsencode(preset)
         if progress is not None:
             desc.progress = type(desc.progress)(guarded(lambda user, done, total: int(progress(done, total) or 0), 1))
         pointer = ctypes.c_void_p()

@@ -1,8 +1,11 @@
 # SPDX-FileCopyrightText: semrover authors
 # SPDX-License-Identifier: Apache-2.0
-"""make_golden.py: writes the golden cases transformer_objects and transformer_voxels, transformers conditioned on
-objects, as the module of the recipe computes them: semantic tokens alone, and voxel tokens too. The inputs but the
-condition are those of transformer_tiny; the weights are random."""
+"""make_golden.py: writes golden cases of what public code lacks, as the modules of the recipes compute them.
+
+- transformer_objects and transformer_voxels, transformers conditioned on objects: semantic tokens alone, and voxel
+  tokens too. The inputs but the condition are those of transformer_tiny; the weights are random.
+- sampling_distilled: the few steps of a distilled model, each one pass, with quadratic spacing and fresh noise that makes
+  up for errors. Weights and inputs are those of sampling_ddpm."""
 import json
 import os
 
@@ -14,7 +17,9 @@ from semtrain import safetensors_file
 from semtrain.condition import vector_of
 from semtrain.model_folder import write_component
 from semtrain.nets.transformer import VoxfieldTransformer
+from semtrain.regenerate import network_of
 from semtrain.objects import owners_of
+from semtrain.sampler import steps_of
 
 NAMES = {"transformer_objects": False, "transformer_voxels": True}
 NETWORK = {"num_layers": 2, "num_attention_heads": 2, "attention_head_dim": 32, "points_per_voxel": 20,
@@ -67,9 +72,36 @@ def make(name, voxels):
                                                     "prediction_type": "sample"}, model.state_dict())
 
 
+def make_sampling():
+    case, given = golden.read_case("sampling_ddpm")
+    inputs = {name: t for name, t in given.items() if name.startswith("input.")}
+    scheduler = {name: case["params"][name] for name in ("num_train_timesteps", "beta_schedule", "beta_start", "beta_end")}
+    scheduler.update(timestep_spacing="quadratic", variance_type="analytic",
+                     prediction_errors=[[0, 0.0, 0.001], [500, 0.001, 0.07], [999, 0.002, 0.1]])
+    steps = steps_of({"_class_name": "DDPMScheduler", **scheduler}, 4)
+    inputs["input.noise"] = inputs["input.noise"][:4].clone()
+    model, x = golden.load_network(lambda config: VoxfieldTransformer(**network_of(config)), "sampling_ddpm"), \
+        inputs["input.noise_initial"]
+    labels, centers, valid = inputs["input.labels"].long(), inputs["input.centers"], inputs["input.valid"].bool()
+    for (t, of_x0, of_x, fresh), noise in zip(zip(*steps), inputs["input.noise"]):
+        with torch.no_grad():
+            x0 = model(x, labels, centers, valid, t[None]).clamp(-1, 1)
+        x = of_x0 * x0 + of_x * x + (noise.unflatten(2, (-1, 2, 3)) * fresh[:, None]).flatten(2)
+    folder = os.path.join(golden.FOLDER, "sampling_distilled")
+    os.makedirs(folder, exist_ok=True)
+    params = {"sampler": "ddpm", "steps": 4, "guidance_scale": 1.0, **scheduler, "clip_sample": True,
+              "timesteps": steps.timesteps.tolist()}
+    with open(os.path.join(folder, "case.json"), "w") as file:
+        json.dump({"kind": "voxfield_sampling", "note": "by tools/train/tests/make_golden.py: one pass a step",
+                   "params": params, "model": "../sampling_ddpm/model", "tolerance": case["tolerance"]}, file, indent=1)
+        file.write("\n")
+    safetensors_file.write(os.path.join(folder, "tensors.safetensors"), {**inputs, "expect.sample": x})
+
+
 def main():
     for name, voxels in NAMES.items():
         make(name, voxels)
+    make_sampling()
 
 
 if __name__ == "__main__":
