@@ -223,6 +223,9 @@ TEST(CliConvert, a_transformer_comes_along_with_its_adapter)
     EXPECT_EQ(set->tensors()[0].dtype, DType::f32);
     const std::string adapter = "voxfield_transformer/pytorch_lora_weights.safetensors";
     EXPECT_EQ(contents(folder / "out" / adapter), contents(Path(SEMROVER_SOURCE_DIR "/assets/model") / adapter));
+    const std::string quality = "voxfield_transformer/quality.safetensors"; // of a preset
+    EXPECT_EQ(contents(folder / "out" / quality), contents(Path(SEMROVER_SOURCE_DIR "/assets/model") / quality));
+    EXPECT_EQ(index["presets"], before["presets"]);
     fs::copy(SEMROVER_SOURCE_DIR "/assets/model", folder / "plain", fs::copy_options::recursive);
     fs::remove(folder / "plain" / adapter);
     ASSERT_EQ(convert(folder / "plain", folder / "out", "-y").code, 0);

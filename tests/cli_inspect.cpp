@@ -42,10 +42,10 @@ TEST(CliInspect, a_model_shows_components_config_and_weights)
     EXPECT_EQ(transformer["weights"]["list"].size(), 178u);
     EXPECT_EQ(transformer["weights"]["parameters"], 7862328);
     EXPECT_EQ(transformer["weights"]["bytes"], 2 * 7862328);
-    EXPECT_EQ(transformer["adapter"]["parameters"], 235008);
+    EXPECT_EQ(transformer["adapter"]["parameters"], 1844736);
     const int renderer = 12738180, vae = 1424155, text = 32;
-    EXPECT_EQ(json["parameters"], 7862328 + 235008 + renderer + vae + text);
-    EXPECT_EQ(json["bytes"], 2 * (7862328 + 235008 + renderer + vae + text));
+    EXPECT_EQ(json["parameters"], 7862328 + 1844736 + renderer + vae + text);
+    EXPECT_EQ(json["bytes"], 2 * (7862328 + 1844736 + renderer + vae + text));
     const ProgramResult shown = semrover_program("inspect " + kAssets + "/model");
     EXPECT_NE(shown.out.find("parameters  7862328"), std::string::npos);
     EXPECT_EQ(shown.out.find("proj_in.weight"), std::string::npos); // the list needs -v

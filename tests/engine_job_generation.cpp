@@ -319,6 +319,13 @@ TEST(engine_job_generation, a_preset_is_other_defaults_and_another_adapter)
     EXPECT_EQ(quality->guidance.scale, 2.25f);
     EXPECT_EQ(quality->repaint.jump_length, 2) << "as in the defaults";
     EXPECT_TRUE(quality->model.warnings.empty()) << "it is not distilled";
+    std::filesystem::create_directory(folder / "voxfield_scheduler");
+    folder.put("voxfield_scheduler/scheduler_config.json",
+               R"({"_class_name": "DDPMScheduler", "prediction_type": "sample", "variance_type": "analytic",
+                   "prediction_errors": [[0, 0.25, 0.5]]})");
+    folder.put("model_index.json", R"({"defaults": {"prediction_error_scale": 2}})");
+    EXPECT_EQ(resolved("")->model.scheduler.prediction_errors[0].places, 0.5);
+    EXPECT_EQ(resolved("")->model.scheduler.prediction_errors[0].colors, 1);
     for (const char* odd :
          {R"({"presets": {"quality": {"adapter": "../quality.safetensors"}}})", "[]", R"({"presets": 3})",
           R"({"presets": {"quality": {"adapter": 3}}})", R"({"defaults": 3, "presets": {"quality": {}}})"}) {

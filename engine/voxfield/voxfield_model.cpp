@@ -36,6 +36,7 @@ Status read_defaults(const Json& defaults, VoxfieldDefaults& d)
     d.guidance.from = from;
     d.guidance.until = until;
     fields.integer("distilled_steps", 1, kMaxInferenceSteps, d.distilled_steps);
+    fields.number("prediction_error_scale", 0., 100., d.prediction_error_scale);
     fields.integer("region_size", 1, 4096, d.regions.region_size);
     fields.integer("coverage_threshold", 1, 4096, d.regions.coverage_threshold);
     fields.choice("strategy", {{"complete", RegionStrategy::complete}, {"rim", RegionStrategy::rim}},
@@ -104,6 +105,10 @@ Result<VoxfieldModel> VoxfieldModel::open(const Path& folder, const std::string&
                     scheduler.string());
     if (m.scheduler.sampler == Sampler::euler)
         return fail(ErrorCode::bad_input, "the euler sampler cannot hold known tokens; use ddpm, ddim or dpm++2m");
+    for (PredictionError& error : m.scheduler.prediction_errors) {
+        error.places *= m.defaults.prediction_error_scale;
+        error.colors *= m.defaults.prediction_error_scale;
+    }
     m.scheduler.clip_sample = true; // the method clips x0 to [-1, 1] with every sampler
     return m;
 }

@@ -14,7 +14,8 @@ namespace semrover {
 struct VoxfieldDefaults {
     int num_inference_steps = 50;
     Guidance guidance;
-    int distilled_steps = 0; // of a model whose one pass is guided already: the steps that it was trained for
+    int distilled_steps = 0;           // of a model whose one pass is guided already: the steps that it was trained for
+    double prediction_error_scale = 1; // of the scheduler's prediction_errors
     RegionOptions regions;
     RepaintOptions repaint;
     UsualObjects usual_objects; // to guess objects from labels

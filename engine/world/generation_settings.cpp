@@ -117,6 +117,8 @@ Result<Json> settings_json(const GenerationSettings& s, const Device& device, st
         settings["guidance_until"] = s.guidance.until;
     if (s.guidance.narrows(s.model.config.attention_radius))
         settings["guidance_radius"] = s.guidance.radius;
+    if (s.model.defaults.prediction_error_scale != 1)
+        settings["prediction_error_scale"] = s.model.defaults.prediction_error_scale;
     if (s.other_eta)
         settings["eta"] = s.model.scheduler.eta;
     if (s.regions.tile_cells)

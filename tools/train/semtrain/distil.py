@@ -8,7 +8,7 @@ import torch
 
 from .draws import draws
 from .json_file import read_json
-from .low_rank import merged, read_adapter
+from .low_rank import FILE, merged, read_adapter
 from .model_folder import add_to_index, read_component, write_component, write_scheduler
 from .nets.transformer import VoxfieldTransformer
 from .prefetch import Prefetched
@@ -22,18 +22,25 @@ TRANSFORMER, SCHEDULER = "voxfield_transformer", "voxfield_scheduler"
 
 
 class Teacher:
-    """a model folder, and its sampler with the settings that its defaults give"""
+    """FOLDER or FOLDER:PRESET of a model, and its sampler with the settings that its defaults, or a preset's, give"""
 
-    def __init__(self, folder, device):
+    def __init__(self, name, device):
+        folder, _, preset = name.partition(":")
         self.folder = folder
         self.scheduler = read_json(os.path.join(folder, SCHEDULER, "scheduler_config.json"))
-        self.defaults = read_json(os.path.join(folder, "model_index.json"))["defaults"]
+        index = read_json(os.path.join(folder, "model_index.json"))
+        if preset and preset not in index.get("presets", {}):
+            raise SystemExit(f"{folder} has no preset {preset}")
+        defaults = {**index["defaults"], **(index["presets"][preset] if preset else {})}
+        self.adapter = defaults.pop("adapter", FILE)
+        self.defaults = {name: value for name, value in defaults.items() if value is not None}
         if self.defaults.get("known_tokens") != "clean":
             raise SystemExit(f"{folder}: expected a model whose known_tokens are clean")
         self.config = read_component(os.path.join(folder, TRANSFORMER))[0]
-        self.model = load_transformer(os.path.join(folder, TRANSFORMER)).to(device)
+        self.model = load_transformer(os.path.join(folder, TRANSFORMER), self.adapter).to(device)
         self.guidance = Guidance.of(self.defaults)
-        self.steps = steps_of(self.scheduler, self.defaults["num_inference_steps"]).to(device)
+        self.steps = steps_of(self.scheduler, self.defaults["num_inference_steps"],
+                              self.defaults.get("prediction_error_scale", 1)).to(device)
 
     def first_steps(self, count):
         """of the groups of so many steps that a student takes as one -> [n / count]"""
@@ -113,7 +120,8 @@ def main(arguments=None):
     p.set_defaults(config="distil")
     p.add_argument("--grids", nargs="+", required=True, help=".sgrid files with points, or folders of them")
     p.add_argument("--held-out", nargs="+", default=[], help="the same, of which the loss is logged alone")
-    p.add_argument("--teacher", required=True, help="model folder; its defaults say how it samples")
+    p.add_argument("--teacher", required=True, metavar="MODEL[:PRESET]",
+                   help="model folder; its defaults, or those of a preset, say how it samples")
     p.add_argument("--init", help="a voxfield_transformer folder to start from; default: the teacher's")
     options = p.parse_args(arguments)
     config = resolve("transformer", options)
@@ -123,8 +131,9 @@ def main(arguments=None):
     torch.manual_seed(config["seed"])
     student = VoxfieldTransformer(**config["network"])
     trainer = Trainer(options.output, student, config, exporter(options.output, config, teacher))
-    init = options.init or os.path.join(options.teacher, TRANSFORMER)
-    trainer.start_from(merged(read_component(init)[1], read_adapter(init)))
+    init, adapter = (options.init, FILE) if options.init else \
+        (os.path.join(teacher.folder, TRANSFORMER), teacher.adapter)
+    trainer.start_from(merged(read_component(init)[1], read_adapter(init, adapter)))
     sets, held = sets_of(options.grids, options.output, "cache", config), None
     if options.held_out:
         held = Distillation(teacher, sets_of(options.held_out, options.output, "cache_held_out", config), config).loss

@@ -40,9 +40,9 @@ def is_adapter(name):
     return name.endswith((DOWN, UP))
 
 
-def read_adapter(folder):
+def read_adapter(folder, file=FILE):
     """-> {name: tensor}, empty where the folder has none"""
-    path = os.path.join(folder, FILE)
+    path = os.path.join(folder, file)
     return safetensors_file.read(path) if os.path.exists(path) else {}
 
 

@@ -4,12 +4,11 @@
 neither was trained on: squared errors at the student's timesteps, a table in Markdown. The first row is the teacher's
 own single pass, which is where a student begins."""
 import argparse
-import os
 import tempfile
 
 import torch
 
-from .distil import TRANSFORMER, Distillation, Teacher
+from .distil import Distillation, Teacher
 from .grids import Grids, LocalSets
 from .precision import autocast
 from .regenerate import load_transformer, network_of
@@ -45,7 +44,7 @@ def errors_of(models, drawn, batches):
 def main(arguments=None):
     p = argparse.ArgumentParser(prog="tools/train/run measure_distilled", description=__doc__)
     p.add_argument("--grids", nargs="+", required=True, help=".sgrid files with points, or folders of them")
-    p.add_argument("--teacher", required=True, help="model folder, as `run distil` takes it")
+    p.add_argument("--teacher", required=True, metavar="MODEL[:PRESET]", help="as `run distil` takes it")
     p.add_argument("--student", action="append", default=[], metavar="NAME=FOLDER",
                    help="a voxfield_transformer folder")
     p.add_argument("--teacher-steps", type=int, default=1, help="that one of the students' replaces")
@@ -56,19 +55,18 @@ def main(arguments=None):
     options = p.parse_args(arguments)
     use_threads(options.threads)
     teacher = Teacher(options.teacher, options.device)
-    named = [("teacher, one pass", os.path.join(options.teacher, TRANSFORMER)),
-             *(item.split("=", 1) for item in options.student)]
+    named = [item.split("=", 1) for item in options.student]
     config = {**CONFIG, **{name: teacher.scheduler[name] for name in ("num_train_timesteps", "beta_start", "beta_end")},
               "device": options.device, "set_size": [options.cells] * 2, "teacher_steps": options.teacher_steps,
               "network": network_of(teacher.config)}
     with tempfile.TemporaryDirectory() as cache:
         drawn = Distillation(teacher, LocalSets(Grids(options.grids, cache), config), config)
-        models = [load_transformer(folder).to(options.device) for _, folder in named]
+        models = [teacher.model, *(load_transformer(folder).to(options.device) for _, folder in named)]
         errors = errors_of(models, drawn, options.batches)
     bands = ("t < 200", "200 to 700", "above")
     head = ["model", *(f"{what}, {band}" for what in ("places", "colours") for band in bands)]
     print("| " + " | ".join(head) + " |\n|" + "---|" * len(head))
-    for (name, _), of_model in zip(named, errors):
+    for (name, _), of_model in zip([("teacher, one pass", ""), *named], errors):
         print("| " + " | ".join([name, *(f"{e:.5f}" for e in of_model.t().flatten())]) + " |", flush=True)
 
 

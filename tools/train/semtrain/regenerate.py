@@ -11,7 +11,7 @@ import torch
 from .condition import vector_of
 from .draws import Draws
 from .grids import read_tokens
-from .low_rank import merged, read_adapter
+from .low_rank import FILE, merged, read_adapter
 from .model_folder import read_component
 from .nets.transformer import VoxfieldTransformer
 from .objects import has_box, owned
@@ -31,11 +31,11 @@ def network_of(config):
             if not name.startswith("_") and name not in ("prediction_type", "placement")}
 
 
-def load_transformer(folder):
-    """-> VoxfieldTransformer of a voxfield_transformer folder, its adapter merged, evaluating"""
+def load_transformer(folder, adapter=FILE):
+    """-> VoxfieldTransformer of a voxfield_transformer folder, an adapter of it merged, evaluating"""
     config, state = read_component(folder)
     model = VoxfieldTransformer(**network_of(config))
-    state = merged(state, read_adapter(folder))
+    state = merged(state, read_adapter(folder, adapter))
     model.load_state_dict({name: t.float() for name, t in state.items()})
     return model.eval().requires_grad_(False)
 

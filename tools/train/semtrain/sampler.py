@@ -41,8 +41,8 @@ def timesteps_of(train, steps, spacing):
     raise SystemExit(f"timestep_spacing: expected quadratic or trailing, found {spacing}")
 
 
-def steps_of(scheduler, steps):
-    """scheduler: a transformer's scheduler_config.json -> Steps"""
+def steps_of(scheduler, steps, error_scale=1):
+    """scheduler: a transformer's scheduler_config.json; error_scale: of its prediction_errors -> Steps"""
     kind, variance = scheduler["_class_name"], scheduler.get("variance_type", "fixed_small")
     if kind != "DDPMScheduler" or scheduler["beta_schedule"] != "linear" or variance not in ("fixed_small", "analytic"):
         raise SystemExit(f"expected a DDPMScheduler with linear betas and variance_type fixed_small or analytic, found "
@@ -54,7 +54,7 @@ def steps_of(scheduler, steps):
     if variance == "analytic":
         rows = np.array(scheduler["prediction_errors"])
         errors = torch.from_numpy(np.stack([np.interp(t, rows[:, 0], rows[:, i]) for i in (1, 2)], 1))
-    fresh = (small[:, None] + of_x0[:, None] ** 2 * errors).sqrt()
+    fresh = (small[:, None] + of_x0[:, None] ** 2 * error_scale * errors).sqrt()
     fresh[-1] = 0
     return Steps(torch.from_numpy(t), of_x0.float(), of_x.float(), fresh.float())
 
