@@ -4,6 +4,7 @@
 import contextlib
 import io
 import os
+import shutil
 import subprocess
 import tempfile
 import unittest
@@ -185,6 +186,27 @@ class TheRecipe(unittest.TestCase):
                 torch.testing.assert_close(whole[name], tensor, atol=2e-3, rtol=0)
         subprocess.run([semrover_path(), "generate", self.semantic, "-m", self.path("rank4/voxfield_transformer"), "-o",
                         self.path("adapted.sgrid"), "--steps", "2", "--quiet"], check=True)
+
+    def test_a_preset_of_the_teacher_says_how_it_samples_and_with_which_adapter(self):
+        folder = self.path("with-preset")
+        shutil.copytree(self.teacher, folder)
+        weights, index = os.path.join(folder, "voxfield_transformer"), os.path.join(folder, "model_index.json")
+        name = next(n for n, t in read_component(weights)[1].items() if n.endswith("to_q.weight") and t.dim() == 2)
+        layer, (rows, columns) = name[:-len(".weight")], read_component(weights)[1][name].shape
+        safetensors_file.write(os.path.join(weights, "other.safetensors"), {
+            layer + ".lora_A.weight": torch.ones(1, columns), layer + ".lora_B.weight": torch.ones(rows, 1)})
+        about = read_json(index)
+        about["defaults"]["distilled_steps"] = 4
+        write_json(index, {**about, "presets": {"many": {
+            "adapter": "other.safetensors", "num_inference_steps": 8, "guidance_scale": 3.0, "distilled_steps": None}}})
+        plain, many = Teacher(folder, "cpu"), Teacher(folder + ":many", "cpu")
+        self.assertEqual((len(plain.steps.timesteps), plain.guidance.scale), (4, 2.5))
+        self.assertEqual((len(many.steps.timesteps), many.guidance.scale, many.guidance.radius), (8, 3.0, 0.6))
+        self.assertNotIn("distilled_steps", many.defaults)
+        added = many.model.state_dict()[name] - plain.model.state_dict()[name]
+        torch.testing.assert_close(added, torch.ones_like(added))
+        with self.assertRaisesRegex(SystemExit, "has no preset few"):
+            Teacher(folder + ":few", "cpu")
 
     def test_goes_on_where_it_stopped(self):
         whole = self.distil("run", 12)
