@@ -273,7 +273,8 @@ TEST_F(CliEdit, what_makes_no_sense_is_refused_in_one_line)
     expect_refusal(edit("--insert " + path("in.sgrid") + " --at 0,0,0 --rotate 30"), 2, "0, 90, 180 or 270");
     expect_refusal(edit("--copy --class car --by 1e7,0,0"), 3, "absurd");
     expect_refusal(edit("--remove car --halo 99 -m " + kModel), 2, "--halo");
-    expect_refusal(edit("--remove car --seeds 1,2"), 2, "need a model");
+    for (const char* option : {"--seeds 1,2", "--seed 1", "--dry-run", "--preset quality", "--steps 2", "--batch 3"})
+        expect_refusal(edit(std::string("--remove car ") + option), 2, "requires --model");
     expect_refusal(edit("--remove car --seeds 1,1 -m " + kModel), 2, "given twice");
     expect_refusal(edit("--remove car -m " + path("none")), 3, "none");
     expect_refusal(edit("--remove all --box=-99,-99,-99:99,99,99"), 3, "leaves no voxel");

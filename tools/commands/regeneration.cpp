@@ -199,15 +199,19 @@ Result<Json> generate_targets(const Regeneration& what, const RegenerationArgume
 
 void add_regeneration_options(CLI::App& c, RegenerationArguments& o)
 {
-    c.add_option("-m,--model", o.generation.options.model, "model folder");
+    CLI::Option* model = c.add_option("-m,--model", o.generation.options.model, "model folder");
     c.add_option("-o,--output", o.output, "what to write; OUTPUT.undo beside it takes it back");
     c.add_option(
         "--objects", o.objects,
         "boxes and colours that condition the model: objects.json, auto (guessed from the labels and the seed) "
         "or none; by default the file beside GRID, or else auto");
+    const size_t others = c.get_options().size();
     add_seed(c, "-s,--seed", o.seed, "noise seed");
     add_seeds(c, "--seeds", o.seeds, "several seeds, such as 1,2,3: writes OUTPUT-seedN.sgrid for each");
     add_generation_options(c, o.generation);
+    const std::vector<CLI::Option*> options = c.get_options();
+    for (CLI::Option* option : std::span(options).subspan(others))
+        option->needs(model);
 }
 
 Status check_outputs(const Path& input, const RegenerationArguments& o, const Globals& globals)
@@ -217,8 +221,6 @@ Status check_outputs(const Path& input, const RegenerationArguments& o, const Gl
     for (const uint64_t seed : o.seeds)
         if (std::ranges::count(o.seeds, seed) > 1)
             return fail(ErrorCode::usage, "--seeds: {} is given twice", seed);
-    if (o.generation.options.model.empty() && (!o.seeds.empty() || o.seed || o.generation.dry_run))
-        return fail(ErrorCode::usage, "--seed, --seeds and --dry-run need a model: without -m nothing is generated");
     if (o.generation.dry_run)
         return {};
     if (o.output.empty())

@@ -103,7 +103,7 @@ class Used(WithAVae):
         made = model(noisy, previous, buffer, visible, t)
         error = (a.sqrt() * made + (1 - a).sqrt() * noisy - noise).square().mean((1, 2, 3))
         loss = asd.step_loss(model, batches.make(3), alphas, config, draws(config, 3, 1))[0]
-        self.assertTrue(torch.equal(loss, (error / a.flatten()).mean()))
+        self.assertTrue(torch.equal(loss, (1 / a.flatten() * error).mean()))
 
     def test_a_changed_mask_makes_other_latents(self):
         plain = self.sequences()[0].truth[:]
