@@ -328,7 +328,8 @@ TEST(engine_job_generation, a_preset_is_other_defaults_and_another_adapter)
     EXPECT_EQ(resolved("")->model.scheduler.prediction_errors[0].colors, 1);
     for (const char* odd :
          {R"({"presets": {"quality": {"adapter": "../quality.safetensors"}}})", "[]", R"({"presets": 3})",
-          R"({"presets": {"quality": {"adapter": 3}}})", R"({"defaults": 3, "presets": {"quality": {}}})"}) {
+          R"({"presets": {"quality": 3}})", R"({"presets": {"quality": {"adapter": 3}}})",
+          R"({"defaults": 3, "presets": {"quality": {}}})"}) {
         folder.put("model_index.json", odd);
         const auto refused = resolved("quality");
         ASSERT_FALSE(refused) << odd;

@@ -10,18 +10,47 @@ namespace semrover {
 
 namespace {
 
+Result<Json> index_of(const Path& folder)
+{
+    const Path path = folder / "model_index.json";
+    Json index = Json::object();
+    if (is_there(path)) {
+        SR_TRY(index, read_json(path));
+    }
+    if (!index.is_object())
+        return fail(ErrorCode::bad_input, "{}: expected an object, found {}", quote_path(path), index.type_name());
+    return index;
+}
+
 Result<Json> preset_of(const Json& index, const std::string& name)
 {
     const Json presets = index.value("presets", Json::object());
     if (!presets.is_object())
         return fail(ErrorCode::bad_input, "model_index.json: presets: expected an object");
-    if (const auto found = presets.find(name); found != presets.end() && found->is_object())
+    if (const auto found = presets.find(name); found != presets.end()) {
+        if (!found->is_object())
+            return fail(ErrorCode::bad_input, "model_index.json: presets: {}: expected an object", quote(name));
         return *found;
+    }
     std::vector<std::string> names;
     for (const auto& [other, settings] : presets.items())
         names.push_back(other);
     return fail(ErrorCode::usage, "no preset of the model is called {}; {}", quote(name),
                 names.empty() ? "it has none" : fmt::format("choose from {}", fmt::join(names, ", ")));
+}
+
+// puts the preset's settings over the model's defaults -> its adapter; empty where it takes the usual one
+Result<Path> take_preset(const Json& index, const std::string& name, const Path& transformer, Json& defaults)
+{
+    SR_TRY(const Json settings, preset_of(index, name));
+    SR_TRY(const std::string file, preset_adapter(settings));
+    const Path adapter = file == kAdapterFile ? Path() : transformer / file;
+    if (!adapter.empty() && !is_file(adapter))
+        return fail(ErrorCode::bad_input, "{} is not there, the adapter of the preset {}", quote_path(adapter),
+                    quote(name));
+    if (defaults.is_object()) // else read_defaults says so
+        defaults.update(settings);
+    return adapter;
 }
 
 Status read_defaults(const Json& defaults, VoxfieldDefaults& d)
@@ -75,24 +104,10 @@ Result<VoxfieldModel> VoxfieldModel::open(const Path& folder, const std::string&
                     folder.string());
     SR_TRY(m.config, read_transformer_config(m.transformer));
     m.warnings = m.config.warnings;
-    Json index = Json::object();
-    if (is_there(folder / "model_index.json")) {
-        SR_TRY(index, read_json(folder / "model_index.json"));
-    }
-    if (!index.is_object())
-        return fail(ErrorCode::bad_input, "{}: expected an object, found {}", quote_path(folder / "model_index.json"),
-                    index.type_name());
+    SR_TRY(const Json index, index_of(folder));
     Json defaults = index.value("defaults", Json::object());
     if (!preset.empty()) {
-        SR_TRY(const Json settings, preset_of(index, preset));
-        SR_TRY(const std::string adapter, preset_adapter(settings));
-        if (adapter != kAdapterFile)
-            m.adapter = m.transformer / adapter;
-        if (!m.adapter.empty() && !is_file(m.adapter))
-            return fail(ErrorCode::bad_input, "{} is not there, the adapter of the preset {}", quote_path(m.adapter),
-                        quote(preset));
-        if (defaults.is_object())
-            defaults.update(settings);
+        SR_TRY(m.adapter, take_preset(index, preset, m.transformer, defaults));
     }
     SR_CHECK(read_defaults(defaults, m.defaults));
     const Path scheduler = folder / "voxfield_scheduler" / "scheduler_config.json";
