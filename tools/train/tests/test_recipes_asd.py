@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from semtrain import asd, distil_asd, empty_prompt, measure_frames, model_folder, safetensors_file, vae
+from semtrain import asd, empty_prompt, measure_frames, model_folder, one_step_asd, safetensors_file, vae
 from semtrain.denoising import alphas_cumprod
 from semtrain.draws import draws, generator
 from semtrain.frames import find_drives
@@ -38,7 +38,8 @@ ASD = {**COMMON, "in_channels": 13, "out_channels": 4, "block_out_channels": [16
        "defaults": {"num_inference_steps": 2, "guidance_scale": 1.5, "previous_noise": 0.3}}
 
 
-DISTIL = {**COMMON, "text_tokens": 1, "train_text": True, "crop": [6, 6], "batch": 4, "mirror": True, "chained": 0.5}
+ONE_STEP = {**COMMON, "text_tokens": 1, "train_text": True, "crop": [6, 6], "batch": 4, "mirror": True, "chained": 0.5,
+            "error_weight": 1.0, "feature_weight": 1.0, "discriminator_weight": 0.2}
 
 
 def put_radius(drive, radius):
@@ -82,7 +83,7 @@ class Recipes(unittest.TestCase):
         for i in range(2):
             draw_drive(cls.path("frames", str(i)), i)
             put_radius(cls.path("frames", str(i)), "auto")
-        for name, config in (("vae", VAE), ("asd", ASD), ("distil", DISTIL)):
+        for name, config in (("vae", VAE), ("asd", ASD), ("one_step", ONE_STEP)):
             with open(cls.path(name + ".json"), "w") as file:
                 json.dump(config, file)
         cls.train(vae, "vae", "of_vae", "--set", "steps=60")
@@ -229,42 +230,67 @@ class Recipes(unittest.TestCase):
         with self.assertRaisesRegex(SystemExit, f"the text has {width + 8} channels, the UNet expects {width}"):
             asd.read_init(self.path("plain"), config)
 
-    def distil(self, output, *more):
-        self.train(distil_asd, "distil", output, "--teacher", self.path("taught"), *more)
+    def train_one_step(self, output, *more):
+        self.train(one_step_asd, "one_step", output, "--init", self.path("begun"), *more)
+
+    def one_step_of(self, folder):
+        """a renderer of a model folder, which draws in one step, and its pairs, whose previous frames are true"""
+        config = {**ONE_STEP, "chained": 0.0, "batch": 16}
+        made = sequences(self.path("of_vae", "vae"), find_drives(self.path("frames")), self.path("measured"), config)
+        state, _ = one_step_asd.one_step_init(folder, config)
+        torch.manual_seed(1)
+        model = one_step_asd.OneStep(config)
+        model.load_state_dict({n: t.float() for n, t in state.items()}, strict=False)
+        return model, one_step_asd.Pairs(made, 0.3, config), config
 
     def one_step_error(self, folder):
-        """of a model's one step against the teacher's two, on frames whose previous ones are true"""
-        config = {**DISTIL, "chained": 0.0, "batch": 16}
-        teacher = distil_asd.Teacher(self.path("taught"), config)
-        made = sequences(self.path("of_vae", "vae"), find_drives(self.path("frames")), self.path("measured"), config)
-        model, of_model = asd.Renderer(config), dict(config)
-        model.load_state_dict({n: t.float() for n, t in asd.read_init(folder, of_model).items()})
+        model, pairs, config = self.one_step_of(folder)
         with torch.no_grad():
-            return float(distil_asd.loss_of(distil_asd.Pairs(made, 0.3, config), teacher, config)(model, 1000)[0])
+            return float(one_step_asd.error_of_held_out(pairs, config)(model, 1000, None)[0])
 
-    def test_one_step_of_a_student_draws_what_two_of_its_teacher_do(self):
-        self.train_asd("taught", "--set", "steps=60", "--set", "few_steps=[2]")
-        index = read_json(self.path("taught", "model_index.json"))
-        index["defaults"]["renderer"]["guidance_scale"] = 1.5
-        write_json(self.path("taught", "model_index.json"), index)
-        self.distil("student", "--set", "steps=80", "--held-out", self.path("frames"))
-        before, after = (self.one_step_error(self.path(name)) for name in ("taught", "student"))
-        self.assertLess(after, 0.5 * before)
-        defaults = read_json(self.path("student", "model_index.json"))["defaults"]["renderer"]
+    def test_one_step_is_learned_from_true_frames(self):
+        self.train_asd("begun", "--set", "steps=60", "--set", "few_steps=[2]")
+        self.train_one_step("one", "--set", "steps=80", "--held-out", self.path("frames"))
+        before, after = (self.one_step_error(self.path(name)) for name in ("begun", "one"))
+        self.assertLess(after, 0.7 * before)
+        defaults = read_json(self.path("one", "model_index.json"))["defaults"]["renderer"]
         self.assertEqual((defaults["num_inference_steps"], defaults["guidance_scale"]), (1, 1))
         self.assertEqual(defaults["splat_radius"], "auto")
-        self.check_that_continuing_changes_nothing(self.distil, "distilled")
-        self.run_engine("refine", self.path("frames", "0", "buffer"), "-m", self.path("student"), "-o",
+        self.check_that_continuing_changes_nothing(self.train_one_step, "one")
+        self.run_engine("refine", self.path("frames", "0", "buffer"), "-m", self.path("one"), "-o",
                         self.path("in_one_step"), "--frames", "0:1", "--quiet")
-        scheduler = self.path("taught", "scheduler", "scheduler_config.json")
+        self.check_who_learns_of_what(*self.one_step_of(self.path("one")))
+        scheduler = self.path("begun", "scheduler", "scheduler_config.json")
         write_json(scheduler, {**read_json(scheduler), "timestep_spacing": "leading"})
-        with self.assertRaisesRegex(SystemExit, "expected timestep_spacing trailing"):
-            self.distil("refused")
+        with self.assertRaisesRegex(SystemExit, "'timestep_spacing': 'trailing'"):
+            self.train_one_step("refused")
+
+    def check_who_learns_of_what(self, model, pairs, config):
+        """the discriminator learns to tell latents apart, the renderer to look true to it; neither of the other's"""
+        made, truth, condition, _ = one_step_asd.drawn(model, pairs, config, 0, None)
+
+        def learns(loss):
+            model.zero_grad(set_to_none=True)
+            loss.backward(retain_graph=True)
+            grads = {name: p.grad for name, p in model.named_parameters() if p.grad is not None}
+            return {name.startswith(one_step_asd.DISCRIMINATOR) for name, grad in grads.items() if grad.any()}
+
+        features, doubted = one_step_asd.likeness_loss(model, made, truth, condition)
+        self.assertEqual([learns(features), learns(doubted)], [{False}] * 2)
+        told_apart = one_step_asd.discriminator_loss(model, made, truth, condition)
+        self.assertEqual(learns(told_apart), {True})
+        adam = torch.optim.Adam(model.discriminator.parameters(), lr=3e-3)
+        for _ in range(30):
+            adam.zero_grad()
+            one_step_asd.discriminator_loss(model, made, truth, condition).backward()
+            adam.step()
+        self.assertLess(float(one_step_asd.discriminator_loss(model, made, truth, condition)), 0.5 * float(told_apart))
+        self.assertEqual(float(one_step_asd.likeness_loss(model, truth, truth, condition)[0]), 0)
 
     def test_pairs_are_neighbours_and_first_frames_have_no_previous(self):
-        made = sequences(self.path("of_vae", "vae"), find_drives(self.path("frames")), self.path("measured"), DISTIL)
-        config = {**DISTIL, "batch": 64, "crop": list(made[0].truth.shape[2:])}
-        (previous, buffer, _), truth, _, has_previous, this, *_ = distil_asd.Pairs(made, 0.0, config).make(0)
+        made = sequences(self.path("of_vae", "vae"), find_drives(self.path("frames")), self.path("measured"), ONE_STEP)
+        config = {**ONE_STEP, "batch": 64, "crop": list(made[0].truth.shape[2:])}
+        (previous, buffer, _), truth, _, has_previous, this, _, of_this, _ = one_step_asd.Pairs(made, 0.0, config).make(0)
         first, before_first = ~has_previous.flatten(), previous.flatten(1).abs().sum(1) == 0
         self.assertTrue(0.1 < first.float().mean() < 0.6)
         for i in range(64):
@@ -272,6 +298,7 @@ class Recipes(unittest.TestCase):
             self.assertEqual(bool(first[i]), n == 0)
             self.assertTrue(torch.equal(buffer[i], s.buffer[max(n - 1, 0)]))
             self.assertTrue(torch.equal(truth[i], s.truth[max(n - 1, 0)]))
+            self.assertTrue(torch.equal(of_this[i], s.truth[n]))
             self.assertEqual(bool(before_first[i]), n < 2)
 
     def test_the_engine_loads_the_folder_and_draws_a_frame_with_it(self):
