@@ -5,6 +5,8 @@ import torch
 from torch import nn
 from torch.nn import functional as F
 
+from .image_blocks import GroupNorm
+
 
 class PatchDiscriminator(nn.Module):
     """[B, channels, h, w] -> features of each layer, the last of which is [B, 1, h / 4, w / 4]: 1 where a patch seems
@@ -15,7 +17,7 @@ class PatchDiscriminator(nn.Module):
         first, second, third = widths
         self.convs = nn.ModuleList([nn.Conv2d(channels, first, 4, 2, 1), nn.Conv2d(first, second, 4, 2, 1),
                                     nn.Conv2d(second, third, 3, 1, 1), nn.Conv2d(third, 1, 3, 1, 1)])
-        self.norms = nn.ModuleList([nn.GroupNorm(width // 16, width) for width in widths[1:]])
+        self.norms = nn.ModuleList([GroupNorm(width // 16, width) for width in widths[1:]])
 
     def forward(self, x):
         x = F.leaky_relu(self.convs[0](x), 0.2)
