@@ -67,10 +67,11 @@ class Pairs:
     def _pair(self, s, i, draw):
         place = crop_place(s, self.crop, draw)
         noise = torch.randn((2, *s.truth[0][place].shape), generator=draw)
-        first = bool(s.first[i])
-        before = i if first else i - 1  # whose own drawing is then not used
+        alone, before_alone = (torch.rand(2, generator=draw) < self.config["first_share"]).tolist()
+        first = alone or bool(s.first[i])
+        before = i if s.first[i] else i - 1
         previous = torch.zeros_like(noise[0])
-        if not s.first[before]:
+        if not (before_alone or s.first[before]):
             previous = s.truth[before - 1][place] + self.level * noise[0]
         return (previous, s.buffer[before][place], s.visible[before][place], s.truth[before][place],
                 self.level * noise[1], torch.full((1, 1, 1), not first), s.buffer[i][place], s.visible[i][place],

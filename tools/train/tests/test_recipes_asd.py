@@ -39,7 +39,7 @@ ASD = {**COMMON, "in_channels": 13, "out_channels": 4, "block_out_channels": [16
 
 
 ONE_STEP = {**COMMON, "text_tokens": 1, "train_text": True, "crop": [6, 6], "batch": 4, "mirror": True, "chained": 0.5,
-            "error_weight": 1.0, "feature_weight": 1.0, "discriminator_weight": 0.2}
+            "first_share": 0.0, "error_weight": 1.0, "feature_weight": 1.0, "discriminator_weight": 0.2}
 
 
 def put_radius(drive, radius):
@@ -290,6 +290,8 @@ class Recipes(unittest.TestCase):
     def test_pairs_are_neighbours_and_first_frames_have_no_previous(self):
         made = sequences(self.path("of_vae", "vae"), find_drives(self.path("frames")), self.path("measured"), ONE_STEP)
         config = {**ONE_STEP, "batch": 64, "crop": list(made[0].truth.shape[2:])}
+        (before, *_), _, _, has_previous, *_ = one_step_asd.Pairs(made, 0.3, {**config, "first_share": 1.0}).make(0)
+        self.assertFalse(before.any() or has_previous.any())
         (previous, buffer, _), truth, _, has_previous, this, _, of_this, _ = one_step_asd.Pairs(made, 0.0, config).make(0)
         first, before_first = ~has_previous.flatten(), previous.flatten(1).abs().sum(1) == 0
         self.assertTrue(0.1 < first.float().mean() < 0.6)
