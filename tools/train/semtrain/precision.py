@@ -14,16 +14,17 @@ def sums_in_fp32(device):
     a step takes four to ten times as long as in fp32 (tests/test_precision.py)."""
     if torch.device(device).type != "cpu":
         return True
-    ones = torch.ones(1024, 16, dtype=torch.bfloat16)
+    ones = torch.ones(1024, 16, dtype=torch.bfloat16, cache_enabled=False)
     with torch.no_grad():
         return bool((ones.t() @ ones == 1024).all())
 
 
 def autocast(precision, device):
-    """the context that networks of a recipe run in; precision: bf16 or fp32"""
+    """the context that networks of a recipe run in; precision: bf16 or fp32. Without PyTorch's cache of weights in bf16:
+    one that is made under no_grad has no gradients, and a later run of the network in the same step would take it"""
     if precision == "fp32" or not sums_in_fp32(device):
         return contextlib.nullcontext()
-    return torch.autocast(torch.device(device).type, dtype=torch.bfloat16)
+    return torch.autocast(torch.device(device).type, dtype=torch.bfloat16, cache_enabled=False)
 
 
 def why_not(precision, device):

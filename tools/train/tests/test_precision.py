@@ -226,6 +226,15 @@ class ARecipe(unittest.TestCase):
         self.assertEqual(seen, [True, True])
         self.assertNotIn("in place of", said)
 
+    def test_a_run_without_gradients_takes_none_from_one_after_it(self):
+        model = nn.Sequential(nn.Linear(8, 8), nn.Linear(8, 8))
+        x = torch.ones(4, 8)
+        with precision.autocast("bf16", "cpu"):
+            with torch.no_grad():
+                x = model(x)
+            model(x).float().square().mean().backward()
+        self.assertTrue(all(p.grad is not None and p.grad.any() for p in model.parameters()))
+
 
 if __name__ == "__main__":
     unittest.main()
