@@ -14,7 +14,7 @@ def sums_in_fp32(device):
     a step takes four to ten times as long as in fp32 (tests/test_precision.py)."""
     if torch.device(device).type != "cpu":
         return True
-    ones = torch.ones(1024, 16, dtype=torch.bfloat16, cache_enabled=False)
+    ones = torch.ones(1024, 16, dtype=torch.bfloat16)
     with torch.no_grad():
         return bool((ones.t() @ ones == 1024).all())
 
