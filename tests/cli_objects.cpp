@@ -56,7 +56,9 @@ class CliObjects : public testing::Test {
     }
     ProgramResult edit(const std::string& input, const std::string& output, const std::string& more) const
     {
-        return semrover_program("edit " + path(input) + " -o " + path(output) + kFast + more);
+        const bool generates = more.find("-m ") != std::string::npos;
+        return semrover_program("edit " + path(input) + " -o " + path(output) + " --quiet " + more +
+                                (generates ? kFast : ""));
     }
     // the golden model with colours that houses have
     std::string knowing_model() const
