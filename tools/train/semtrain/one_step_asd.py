@@ -163,9 +163,8 @@ def main(arguments=None):
     level = defaults["previous_noise"]
     export = OneStepExport(options.output, config, vae, (held_out[0], held[0]) if held else None)
     model = OneStep(config).to(memory_format=torch.channels_last)
-    begin = {f"{DISCRIMINATOR}{name}": p.detach().clone() for name, p in model.discriminator.named_parameters()}
     trainer = Trainer(options.output, model, config, export)
-    trainer.start_from({**state, **begin})
+    trainer.start_from({**model.state_dict(), **state})
     trainer.run(loss_of(Pairs(made, level, config), config),
                 error_of_held_out(Pairs(held_out, level, config), config) if held else None)
 
