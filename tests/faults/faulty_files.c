@@ -4,8 +4,9 @@
 // it is to do below FAULT_FOLDER, which has to be an absolute path:
 //   FAULT_HIDE=FOLDER:SECONDS  what is in the folder is not found, until it is that old there (cached absence)
 //   FAULT=KIND:N:ERRNO         the Nth call of a kind fails; N+: all from then on. ERRNO 0: it does nothing, and says
-//                              that it did; -1: a write takes half of its bytes. With :after behind it the call
-//                              happens, and then fails (a lost answer). Several, with commas between them
+//                              that it did; -1: a write takes half of its bytes; -2: the process stops before it, and
+//                              does it when it is woken (SIGCONT). With :after behind it the call happens, and then
+//                              fails (a lost answer). Several, with commas between them
 //   FAULT_LOG=FILE             gets a line a call, KIND PATH, of a fault FAULT KIND PATH
 //   FAULT_RECORD=FILE          gets all that changes the disk, in order, for power_cuts.py
 // Kinds: create (opened for writing), open, list, entry (of a listing), stat, read, write, flush, close, map, lock,
@@ -16,6 +17,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -154,6 +156,10 @@ static enum Verdict judge(enum Kind kind, const char* path)
         if (strchr(number, '+') ? call < wanted : call != wanted)
             continue;
         say("FAULT ", kind, path);
+        if (error == -2) {
+            raise(SIGSTOP);
+            break;
+        }
         errno = error;
         return error == 0 ? LIES : error < 0 ? HALF : strncmp(at + end, ":after", 6) ? FAILS : FAILS_AFTER;
     }

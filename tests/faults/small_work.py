@@ -35,6 +35,7 @@ region_size = 24
 coverage_threshold = 6
 [output]
 layout = "{layout}"
+{more}
 """
 
 MESH = """\
@@ -129,8 +130,8 @@ class SmallWork:
         write_labels(self.input / "labels.sgrid", 2, 6)
         (self.input / "mesh.obj").write_text(MESH)
         (self.input / "ahead.tum").write_text("".join(f"{x} {x} 1.8 1.6 -0.5 0.5 -0.5 0.5\n" for x in (0.2, 0.8)))
-        (self.input / "job.toml").write_text(JOB.format(layout="folder"))
-        (self.input / "shards.toml").write_text(JOB.format(layout="shards"))
+        (self.input / "job.toml").write_text(JOB.format(layout="folder", more=""))
+        (self.input / "shards.toml").write_text(JOB.format(layout="shards", more='buffers = ["color", "depth"]'))
         for line in INPUTS:
             done = self.run(line)
             assert done.returncode == 0, f"{line}: {done.stderr}"

@@ -4,6 +4,7 @@
 
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
+#include "runtime/base/unfinished.h"
 #include "runtime/system/host_name.h"
 #include "runtime/system/system.h"
 
@@ -48,6 +49,11 @@ bool is_known_dead(const Path& attempt)
     return name && name->host == host_name() && name->pid > 0 && system::process_is_gone(name->pid);
 }
 
+bool take_copy(const Path& from, const Path& to)
+{
+    return make_folder(to.parent_path()) && system::copy_file(from, to) == 0;
+}
+
 // a hard link, or a copy where the file system has none
 bool take_file(const Path& from, const Path& to)
 {
@@ -58,32 +64,39 @@ bool take_file(const Path& from, const Path& to)
     return (!error || system::copy_file(from, to) == 0) && system::flush_folder(to.parent_path()) == 0;
 }
 
-bool is_state(const std::string& name)
+// What a run goes on from, of an attempt that may be working, be published or be removed in the meantime. Its state is
+// taken first: what the journal names is there then. `summary`, which its run.json holds, is another before anything of
+// that goes away; false where it is
+bool take_run(const Path& from, const Path& to, const Path& run, const Json& summary)
 {
-    return name == "run.json" || name == "journal.jsonl";
-}
-
-// What a run goes on from. Its journal is taken first: what it names is there then. The other process may still append
-// to its own.
-void take_run(const Path& from, const Path& to)
-{
+    if (!take_copy(from / run, to / run))
+        return false;
+    const Path journal = run.parent_path() / "journal.jsonl";
+    if (is_there(from / journal) && !take_copy(from / journal, to / journal))
+        return false;
     std::error_code error;
     std::vector<Path> files;
     for (fs::recursive_directory_iterator i(from, error), end; i != end; i.increment(error)) {
         const std::string name = i->path().filename().string();
-        if (i->is_symlink(error) || !i->is_regular_file(error) || name == "lock" || name.starts_with(".semrover-"))
-            continue;
-        const Path target = to / i->path().lexically_relative(from);
-        if (is_state(name)) {
-            std::error_code ignored;
-            fs::create_directories(target.parent_path(), ignored);
-            (void)system::copy_file(i->path(), target);
-        } else {
-            files.push_back(i->path());
-        }
+        const Path file = i->path().lexically_relative(from);
+        if (!i->is_symlink(error) && i->is_regular_file(error) && file != run && file != journal && name != "lock" &&
+            !name.starts_with(".semrover-"))
+            files.push_back(file);
     }
     for (const Path& file : files)
-        (void)take_file(file, to / file.lexically_relative(from));
+        if (!take_file(from / file, to / file) && is_there(from / file))
+            return false;
+    const auto now = read_json(from / run);
+    return now && *now == summary;
+}
+
+// by its name at once, so that nobody takes over a part of it
+void remove_attempt(const Path& attempt)
+{
+    std::error_code error;
+    const Path removed = attempt.parent_path() / unfinished_name();
+    fs::rename(attempt, removed, error);
+    fs::remove_all(error ? attempt : removed, error);
 }
 
 double seconds_since_change(const Path& folder)
@@ -151,12 +164,13 @@ bool Attempt::adopt(const Path& run, const std::string& device, const std::strin
                             json_text(settings.value("device", Json()))));
             continue;
         }
-        take_run(other / "work", work_);
-        if (is_known_dead(other)) {
-            std::error_code ignored;
-            fs::remove_all(other, ignored);
+        if (take_run(other / "work", work_, run, *summary)) {
+            if (is_known_dead(other))
+                remove_attempt(other);
+            return true;
         }
-        return true;
+        std::error_code ignored;
+        fs::remove_all(work_, ignored);
     }
     return false;
 }
@@ -194,16 +208,15 @@ Result<Attempt::Published> Attempt::publish(const std::string& name, const std::
     const int failed = system::rename_surely(files_, to);
     (void)system::flush_folder(to.parent_path());
     const auto there = read_manifest(to);
-    std::error_code ignored;
     if (there && there->attempt == name_) {
         for (const Path& other : older())
             if (is_known_dead(other))
-                fs::remove_all(other, ignored);
-        fs::remove_all(folder_, ignored);
+                remove_attempt(other);
+        remove_attempt(folder_);
         return Published::by_this;
     }
     if (there && there->key == key) {
-        fs::remove_all(folder_, ignored);
+        remove_attempt(folder_);
         return Published::by_another;
     }
     if (there)
@@ -221,8 +234,10 @@ size_t Attempt::clean(const Path& out, double seconds, const std::function<bool(
         all.push_back(i->path());
     for (const Path& attempt : all) {
         const auto name = parse_name(attempt.filename().string());
-        if (name && is_done(name->key) && seconds_since_change(attempt) >= seconds)
-            removed += fs::remove_all(attempt, error) > 0;
+        if (is_abandoned(attempt) || (name && is_done(name->key) && seconds_since_change(attempt) >= seconds)) {
+            remove_attempt(attempt);
+            ++removed;
+        }
     }
     return removed;
 }

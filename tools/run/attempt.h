@@ -26,8 +26,9 @@ class Attempt {
     const std::string& name() const { return name_; }
 
     // Takes over what an older attempt at the same task has finished: links to its files, which it may go on writing
-    // beside. Of another device's nothing is taken: `run` is the state file of the command, from work() on. The one
-    // that is taken over is removed if its process is known to be gone. What was not taken is said by `say`
+    // beside; nothing where it ends in the meantime. Of another device's nothing is taken: `run` is the state file of
+    // the command, from work() on. The one that is taken over is removed if its process is known to be gone. What was
+    // not taken is said by `say`
     bool adopt(const Path& run, const std::string& device, const std::string& driver,
                const std::function<void(const std::string&)>& say);
     // an older attempt that had all its files and a manifest of this key, but was not published; false: there is none
@@ -38,7 +39,8 @@ class Attempt {
     // renaming fails. `name`: Task::name()
     Result<Published> publish(const std::string& name, const std::string& key);
 
-    // attempts of a job that nobody goes on with: of a key that `is_done`, older than that many seconds
+    // attempts of a job that nobody goes on with: of a key that `is_done`, older than that many seconds; what was begun
+    // to be removed
     static size_t clean(const Path& out, double seconds, const std::function<bool(const std::string& key)>& is_done);
     static std::set<std::string> keys(const Path& out); // of tasks that attempts are there of
 

@@ -27,8 +27,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kMostDevices = 3; // that are lost, before the error stands
-// of a run, and no result; run.json last: a run goes on as long as it is there
-constexpr const char* kState[] = {"scene.sgrid.run", "latents", "encoded", "journal.jsonl", "lock", "run.json"};
+// of a run, and no result
+constexpr const char* kState[] = {"run.json", "journal.jsonl", "scene.sgrid.run", "latents", "encoded", "lock"};
 // of a street that is made up, what is of use to who has the scene
 constexpr const char* kStreetFiles[] = {"semantic.sgrid", "objects.json", "street.json", "drive.tum"};
 
@@ -290,6 +290,7 @@ Status TaskRunner::seal(const Task& task, const Attempt& attempt, Manifest manif
     SR_TRY(manifest.files, list_contents(attempt.work(), kState));
     SR_CHECK(write_manifest(attempt.work(), manifest));
     std::error_code error;
+    fs::remove(attempt.work() / run_state(task), error); // first: nobody goes on from a run that has lost a part
     for (const char* name : kState)
         fs::remove_all(attempt.work() / name, error);
     if (const int failed = system::rename_surely(attempt.work(), attempt.files()))
