@@ -61,6 +61,15 @@ TEST(RendererModel, a_folder_gives_configs_scheduler_text_and_defaults)
     EXPECT_NE(*RendererModel::open(folder.path())->hash(), *hash);
 }
 
+TEST(RendererModel, a_model_index_that_is_no_object_is_refused)
+{
+    const ScratchFolder folder;
+    put_model(folder.path());
+    folder.put("model_index.json", "[1]");
+    const auto m = RendererModel::open(folder.path());
+    EXPECT_TRUE(says(m, "model_index.json': expected an object, found array"));
+}
+
 TEST(RendererModel, says_how_wide_the_splats_of_its_buffers_are)
 {
     const ScratchFolder folder;

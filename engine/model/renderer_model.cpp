@@ -3,6 +3,7 @@
 #include "engine/model/renderer_model.h"
 
 #include "engine/model/ldm_config.h"
+#include "engine/model/model_index.h"
 #include "engine/sampling/guidance.h"
 #include "engine/sampling/schedule.h"
 #include "runtime/base/hash.h"
@@ -140,11 +141,11 @@ void read_frame_defaults(JsonFields& fields, RendererDefaults& d)
     fields.number("frame_history", 0.f, kMostFrameHistory, d.frame_history);
 }
 
-Status read_defaults(const Path& path, bool video, RendererDefaults& d, std::vector<std::string>& warnings)
+Status read_defaults(const Path& folder, bool video, RendererDefaults& d, std::vector<std::string>& warnings)
 {
-    SR_TRY(const Json index, read_json(path));
-    const std::string where = quote_path(path) + ": defaults.renderer";
-    const Json all = index.is_object() ? index.value("defaults", Json::object()) : Json::object();
+    SR_TRY(const Json index, read_model_index(folder));
+    const std::string where = quote_path(folder / "model_index.json") + ": defaults.renderer";
+    const Json all = index.value("defaults", Json::object());
     const Json defaults = all.is_object() ? all.value("renderer", Json::object()) : all;
     JsonFields fields(defaults, where);
     fields.integer("num_inference_steps", 1, kMaxInferenceSteps, d.num_inference_steps);
@@ -191,9 +192,7 @@ Status read_folder(RendererModel& m)
     SR_TRY(m.unet, read_config(m.unet_folder / "config.json", parse_any_unet_config));
     SR_TRY(m.vae, read_config(m.vae_folder / "config.json", parse_any_vae_config));
     m.defaults = defaults_of(m.unet);
-    if (is_there(m.folder / "model_index.json"))
-        SR_CHECK(read_defaults(m.folder / "model_index.json", m.unet.video, m.defaults, m.warnings));
-    return {};
+    return read_defaults(m.folder, m.unet.video, m.defaults, m.warnings);
 }
 
 Status read_ldm(RendererModel& m)

@@ -3,24 +3,13 @@
 #include "engine/voxfield/voxfield_model.h"
 
 #include "engine/model/low_rank.h"
+#include "engine/model/model_index.h"
 #include "runtime/base/json_fields.h"
 #include "runtime/base/quote.h"
 
 namespace semrover {
 
 namespace {
-
-Result<Json> index_of(const Path& folder)
-{
-    const Path path = folder / "model_index.json";
-    Json index = Json::object();
-    if (is_there(path)) {
-        SR_TRY(index, read_json(path));
-    }
-    if (!index.is_object())
-        return fail(ErrorCode::bad_input, "{}: expected an object, found {}", quote_path(path), index.type_name());
-    return index;
-}
 
 Result<Json> preset_of(const Json& index, const std::string& name)
 {
@@ -104,7 +93,7 @@ Result<VoxfieldModel> VoxfieldModel::open(const Path& folder, const std::string&
                     folder.string());
     SR_TRY(m.config, read_transformer_config(m.transformer));
     m.warnings = m.config.warnings;
-    SR_TRY(const Json index, index_of(folder));
+    SR_TRY(const Json index, read_model_index(folder));
     Json defaults = index.value("defaults", Json::object());
     if (!preset.empty()) {
         SR_TRY(m.adapter, take_preset(index, preset, m.transformer, defaults));

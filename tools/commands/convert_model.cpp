@@ -3,6 +3,7 @@
 #include "tools/commands/convert.h"
 
 #include "engine/model/low_rank.h"
+#include "engine/model/model_index.h"
 #include "engine/model/renderer_model.h"
 #include "engine/model/weight_blocks.h"
 #include "runtime/base/quote.h"
@@ -164,20 +165,17 @@ Status plan_copies(const Path& in, Conversion& plan)
 {
     const std::string small[] = {"scheduler/scheduler_config.json", "voxfield_scheduler/scheduler_config.json",
                                  "conditioning/conditioning.safetensors"};
-    Json index = Json::object();
-    if (is_there(in / "model_index.json")) {
-        SR_TRY(index, read_json(in / "model_index.json"));
-    }
+    SR_TRY(const Json index, read_model_index(in));
     for (const std::string& file : small) {
         if (!is_there(in / file))
             continue;
         plan.copies[file] = in / file;
         const std::string component = Path(file).parent_path().generic_string();
-        if (index.is_object() && index.contains(component))
+        if (index.contains(component))
             plan.index[component] = index[component];
     }
     for (const char* settings : {"defaults", "presets"})
-        if (index.is_object() && index.contains(settings))
+        if (index.contains(settings))
             plan.index[settings] = index[settings];
     SR_CHECK(copy_adapters(in / "voxfield_transformer", plan));
     static constexpr const char* kKnown[] = {"renderer",           "unet",      "vae",         "voxfield_transformer",

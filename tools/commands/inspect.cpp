@@ -5,6 +5,7 @@
 #include "engine/conditioning/scene_objects.h"
 #include "engine/model/ldm_config.h"
 #include "engine/model/low_rank.h"
+#include "engine/model/model_index.h"
 #include "engine/model/renderer_model.h"
 #include "engine/model/weight_blocks.h"
 #include "engine/scene/palette.h"
@@ -298,10 +299,7 @@ Result<Report> describe_folder(const Path& folder, bool with_tensors)
     Totals totals;
     Report report = {{"model", folder.string()}};
     if (is_there(folder / "model_index.json")) {
-        SR_TRY(const Json index, read_json(folder / "model_index.json"));
-        if (!index.is_object())
-            return fail(ErrorCode::bad_input, "{}: expected an object, found {}",
-                        quote_path(folder / "model_index.json"), index.type_name());
+        SR_TRY(const Json index, read_model_index(folder));
         report["class"] = index.value("_class_name", Json());
         if (index.contains("defaults"))
             report["defaults"] = described_defaults(index["defaults"]);
