@@ -9,13 +9,18 @@
 #include "tests/support/scratch_folder.h"
 
 #include <dlfcn.h>
+#include <functional>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <utility>
 
-// a file system without locks: this program's own flock fails so; 0: it is libc's
+// a file system without locks: this program's own flock fails so; 0: it is libc's. And what others do just before it
 static int flock_error = 0;
+static std::function<void()> before_flock;
 extern "C" int flock(int fd, int operation) noexcept
 {
+    if (const auto meanwhile = std::exchange(before_flock, nullptr))
+        meanwhile();
     if (!flock_error)
         return reinterpret_cast<int (*)(int, int)>(dlsym(RTLD_NEXT, "flock"))(fd, operation);
     errno = flock_error;
@@ -109,6 +114,23 @@ TEST(engine_run_folder, a_second_process_finds_it_busy)
         EXPECT_TRUE(says(second, "another process works in"));
         EXPECT_EQ(second.error().code, ErrorCode::busy);
     }
+}
+
+TEST(engine_run_folder, a_lock_that_was_removed_before_it_was_taken_is_none)
+{
+    const ScratchFolder folder;
+    std::optional<Result<RunFolder>> other;
+    before_flock = [&] { // one that had it ends, and another one begins
+        fs::remove(folder / "run/lock");
+        other.emplace(RunFolder::open(folder / "run", kSettings, false));
+    };
+    EXPECT_TRUE(says(RunFolder::open(folder / "run", kSettings, false), "another process works in"));
+    ASSERT_TRUE(*other);
+    other.reset();
+    before_flock = [&] { fs::remove(folder / "run/lock"); };
+    const auto last = RunFolder::open(folder / "run", kSettings, false);
+    ASSERT_TRUE(last);
+    EXPECT_TRUE(says(RunFolder::open(folder / "run", kSettings, false), "another process works in"));
 }
 
 TEST(engine_run_folder, goes_on_without_locks_and_says_so_once)

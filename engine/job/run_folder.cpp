@@ -42,6 +42,18 @@ Result<system::File> open_own(const Path& path, system::FileUse use)
     return std::move(*file);
 }
 
+// Whether the name is still that of the file. A process that ends removes its lock: whoever opened that one before, and
+// gets it now, has the lock of nothing
+Result<bool> leads_to(const Path& path, const system::File& file)
+{
+    const auto opened = file.facts(), there = system::facts_of(path);
+    if (!there && there.error() == ENOENT)
+        return false;
+    if (!opened || !there)
+        return system_failure("examine", path, !opened ? opened.error() : there.error());
+    return opened->is(*there);
+}
+
 void warn_without_locks(const Path& folder, int error)
 {
     static std::once_flag said;
@@ -163,15 +175,21 @@ Status RunFolder::refuse_links() const
 Status RunFolder::lock()
 {
     const Path path = path_ / "lock";
-    SR_TRY(lock_, open_own(path, system::FileUse::lock));
-    const int error = lock_.lock();
-    if (error == EWOULDBLOCK)
-        return fail(ErrorCode::busy, "another process works in {}", quote_path(path_));
-    if (error && !system::says_no_locks(error))
-        return system_failure("lock", path, error);
-    if (error)
-        warn_without_locks(path_, error);
-    return {};
+    for (;;) {
+        SR_TRY(lock_, open_own(path, system::FileUse::lock));
+        const int error = lock_.lock();
+        if (error == EWOULDBLOCK)
+            return fail(ErrorCode::busy, "another process works in {}", quote_path(path_));
+        if (error && !system::says_no_locks(error))
+            return system_failure("lock", path, error);
+        if (error) {
+            warn_without_locks(path_, error);
+            return {};
+        }
+        SR_TRY(const bool stands, leads_to(path, lock_));
+        if (stands)
+            return {};
+    }
 }
 
 std::vector<std::string> RunFolder::names() const

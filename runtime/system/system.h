@@ -27,6 +27,9 @@ inline bool holds_nul(const Path& path)
 struct FileFacts {
     bool regular = false, folder = false;
     uint64_t bytes = 0;
+    uint64_t volume = 0, number = 0; // together of this file alone, as long as it is there or open
+
+    bool is(const FileFacts& other) const { return volume == other.volume && number == other.number; }
 };
 OrError<FileFacts> facts_of(const Path& path); // of what a link leads to
 

@@ -21,7 +21,8 @@ namespace {
 
 FileFacts facts_from(const struct stat& status)
 {
-    return {bool(S_ISREG(status.st_mode)), bool(S_ISDIR(status.st_mode)), uint64_t(status.st_size)};
+    return {bool(S_ISREG(status.st_mode)), bool(S_ISDIR(status.st_mode)), uint64_t(status.st_size),
+            uint64_t(status.st_dev), uint64_t(status.st_ino)};
 }
 
 int flags_of(FileUse use)

@@ -40,7 +40,8 @@ OrError<FileFacts> facts_from(HANDLE handle)
         return tl::unexpected(last_error());
     const bool folder = found.dwFileAttributes & FILE_ATTRIBUTE_DIRECTORY;
     const bool disk = ::GetFileType(handle) == FILE_TYPE_DISK;
-    return FileFacts{disk && !folder, folder, uint64_t(found.nFileSizeHigh) << 32 | found.nFileSizeLow};
+    return FileFacts{disk && !folder, folder, uint64_t(found.nFileSizeHigh) << 32 | found.nFileSizeLow,
+                     found.dwVolumeSerialNumber, uint64_t(found.nFileIndexHigh) << 32 | found.nFileIndexLow};
 }
 
 struct Opening {
