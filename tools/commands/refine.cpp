@@ -171,9 +171,9 @@ void print_plan(const Refinement& r, const MemoryPlan& plan, const Globals& glob
     if (globals.json || globals.quiet || globals.session)
         return;
     const ImageSize& size = r.cameras.front().buffers.size;
-    fmt::print("{} frames of {} x {}, {}{} steps each\nplanned device memory {} bytes ({}), {}\n", r.frames(),
-               size.width, size.height, windows_text(r), r.settings.steps, plan.bytes, bytes_text(plan.bytes),
-               policy_name(plan.policy));
+    fmt::print("{} frames of {} x {}, {}{} step{} each\nplanned device memory {} bytes ({}), {}\n", r.frames(),
+               size.width, size.height, windows_text(r), r.settings.steps, r.settings.steps == 1 ? "" : "s", plan.bytes,
+               bytes_text(plan.bytes), policy_name(plan.policy));
     std::fflush(stdout);
 }
 
