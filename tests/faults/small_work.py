@@ -214,7 +214,8 @@ def essence(path):
             manifest = json.loads(path.read_text())
             return f"{manifest['key']} {manifest['files']}"
         if path.name == "profile.json":
-            return str(sorted({e["name"] for e in json.loads(path.read_text())["traceEvents"]}))
+            events = json.loads(path.read_text())["traceEvents"]  # of this process: of one that goes on, what was left
+            return f"a trace {all('name' in e for e in events)}"
     except (ValueError, KeyError) as error:
         return f"damaged: {error}"
     return digest(path)
