@@ -9,6 +9,8 @@ import shutil
 import struct
 import subprocess
 import sys
+import tempfile
+import unittest
 
 SEMROVER = os.environ["SEMROVER"]
 SOURCES = pathlib.Path(__file__).resolve().parents[2]
@@ -190,6 +192,18 @@ class SmallWork:
     def temporaries(self):
         return [str(p.relative_to(self.out)) for p in self.out.rglob("*")
                 if p.name.startswith(".semrover-") or p.name.endswith((".passing", ".making"))]
+
+
+class SmallWorkTest(unittest.TestCase):
+    """has a SmallWork, `work`, and the path of a file beside its folder, `log`"""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory(prefix="semrover-faults-")
+        cls.addClassCleanup(folder.cleanup)
+        cls.work = SmallWork(folder.name)
+        cls.log = pathlib.Path(folder.name + ".log")
+        cls.addClassCleanup(lambda: cls.log.unlink(missing_ok=True))
 
 
 def differences(whole, now):

@@ -7,11 +7,9 @@ FAULTS=K tries K of each kind and command, evenly spread, FAULTS=all every one; 
 import collections
 import errno
 import os
-import pathlib
-import tempfile
 import unittest
 
-from small_work import BEGINS_AGAIN, COMMANDS, SmallWork, differences, essence
+from small_work import BEGINS_AGAIN, COMMANDS, SmallWorkTest, differences, essence
 
 LIBRARY = os.environ["FAULTY_FILES"]
 MOST = os.environ.get("FAULTS", "1")
@@ -41,14 +39,10 @@ def spread(count, most):
     return sorted({1 + (2 * i + 1) * count // (2 * most) for i in range(most)})
 
 
-class Faults(unittest.TestCase):
+class Faults(SmallWorkTest):
     @classmethod
     def setUpClass(cls):
-        folder = tempfile.TemporaryDirectory(prefix="semrover-faults-")
-        cls.addClassCleanup(folder.cleanup)
-        cls.work = SmallWork(folder.name)
-        cls.log = pathlib.Path(folder.name + ".log")
-        cls.addClassCleanup(lambda: cls.log.unlink(missing_ok=True))
+        super().setUpClass()
         cls.table = []
 
     @classmethod

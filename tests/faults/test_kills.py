@@ -5,11 +5,10 @@ run. KILLS=N; COMMANDS=a,b only these; SEED=S."""
 import collections
 import os
 import random
-import tempfile
 import time
 import unittest
 
-from small_work import BEGINS_AGAIN, COMMANDS, SmallWork, differences
+from small_work import BEGINS_AGAIN, COMMANDS, SmallWorkTest, differences
 
 KILLS = int(os.environ.get("KILLS", "10"))
 USUAL = ",".join(COMMANDS) if KILLS >= len(COMMANDS) else \
@@ -17,12 +16,10 @@ USUAL = ",".join(COMMANDS) if KILLS >= len(COMMANDS) else \
 ONLY = os.environ.get("COMMANDS", USUAL).split(",")
 
 
-class Kills(unittest.TestCase):
+class Kills(SmallWorkTest):
     @classmethod
     def setUpClass(cls):
-        folder = tempfile.TemporaryDirectory(prefix="semrover-kills-")
-        cls.addClassCleanup(folder.cleanup)
-        cls.work = SmallWork(folder.name)
+        super().setUpClass()
         cls.whole, cls.seconds = {}, {}
 
     def undisturbed(self, name):

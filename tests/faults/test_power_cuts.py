@@ -5,13 +5,11 @@ undisturbed run, or refuses what it finds with a line and takes it with -y. Afte
 
 CUTS=K tries K disks of each command, evenly spread, CUTS=all every one; COMMANDS=a,b only these."""
 import os
-import pathlib
 import random
-import tempfile
 import unittest
 
 from power_cuts import cuts, put, read_record
-from small_work import BEGINS_AGAIN, COMMANDS, SmallWork, differences
+from small_work import BEGINS_AGAIN, COMMANDS, SmallWorkTest, differences
 
 LIBRARY = os.environ["FAULTY_FILES"]
 MOST = os.environ.get("CUTS", "3")
@@ -19,15 +17,7 @@ ONLY = os.environ.get("COMMANDS", "generate,generate_along,render,edit,run").spl
 SEED = 5
 
 
-class PowerCuts(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        folder = tempfile.TemporaryDirectory(prefix="semrover-cuts-")
-        cls.addClassCleanup(folder.cleanup)
-        cls.work = SmallWork(folder.name)
-        cls.record = pathlib.Path(folder.name + ".record")
-        cls.addClassCleanup(lambda: cls.record.unlink(missing_ok=True))
-
+class PowerCuts(SmallWorkTest):
     def test_every_command(self):
         print("\ncommand | calls recorded | disks compared of all | same bytes | refused with a line")
         for name in ONLY:
@@ -35,10 +25,10 @@ class PowerCuts(unittest.TestCase):
 
     def command(self, name, line):
         self.work.clear()
-        self.record.unlink(missing_ok=True)
-        done = self.work.run(line, name=name, LD_PRELOAD=LIBRARY, FAULT_RECORD=str(self.record))
+        self.log.unlink(missing_ok=True)
+        done = self.work.run(line, name=name, LD_PRELOAD=LIBRARY, FAULT_RECORD=str(self.log))
         self.assertEqual(done.returncode, 0, f"{name}: {done.stderr}")
-        whole, calls = self.work.results(), read_record(self.record)
+        whole, calls = self.work.results(), read_record(self.log)
         prefix = str(self.work.out) + "/"
         calls = [call for call in calls if (call.path + "/").startswith(prefix)]
         disks = list(cuts(calls, self.work.out, random.Random(SEED)))

@@ -9,11 +9,10 @@ import collections
 import os
 import pathlib
 import signal
-import tempfile
 import time
 import unittest
 
-from small_work import COMMANDS, SmallWork, differences
+from small_work import COMMANDS, SmallWorkTest, differences
 from test_faults import spread
 
 LIBRARY = os.environ["FAULTY_FILES"]
@@ -23,15 +22,7 @@ CHANGES = ("rename", "move", "mkdir", "link", "unlink")  # of what the other one
 LOOKS = ("list", "entry", "open", "link", "create")  # of one that takes over
 
 
-class TwoAtOnce(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        folder = tempfile.TemporaryDirectory(prefix="semrover-two-")
-        cls.addClassCleanup(folder.cleanup)
-        cls.work = SmallWork(folder.name)
-        cls.log = pathlib.Path(folder.name + ".log")
-        cls.addClassCleanup(lambda: cls.log.unlink(missing_ok=True))
-
+class TwoAtOnce(SmallWorkTest):
     def start(self, name, **fault):
         return self.work.start(COMMANDS[name], name=name, LD_PRELOAD=LIBRARY, **fault)
 
