@@ -168,8 +168,8 @@ int rename_surely(const Path& from, const Path& to)
     if (::rename(from.c_str(), to.c_str()) == 0)
         return 0;
     const int error = errno;
-    const bool happened = error == ENOENT && known && ::lstat(to.c_str(), &after) == 0 &&
-                          after.st_ino == before.st_ino && after.st_dev == before.st_dev;
+    const bool happened =
+        error == ENOENT && known && ::lstat(to.c_str(), &after) == 0 && facts_from(after).is(facts_from(before));
     return happened ? 0 : error;
 }
 
