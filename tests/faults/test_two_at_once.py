@@ -105,12 +105,14 @@ class TwoAtOnce(SmallWorkTest):
                 for call in spread(counts[kind], MOST):
                     self.tried(self.one_stops, name, kind, call)
                     self.tried(self.one_is_killed, name, kind, call)
+                print(name, kind, counts[kind], "calls", flush=True)
             journal = [i for i, entry in enumerate(log) if entry.startswith("flush ") and "journal" in entry]
             for at in (journal[0], journal[-1]):
                 for kind in LOOKS:
                     for call in spread(counts[kind], MOST):
                         work = "flush", kinds[:at + 1].count("flush")
                         self.tried(self.one_stops_while_it_takes_over, name, kind, call, work)
+                    print(name, "takes over at", at, kind, counts[kind], "calls", flush=True)
         print("\n" + ", ".join(f"{what} {n}" for what, n in self.stops.items()), flush=True)
         self.assertEqual(len(self.stops), 3)
 
