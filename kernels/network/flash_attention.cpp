@@ -54,7 +54,7 @@ Tensor flash_attention(Graph& g, Tensor q, Tensor kv, const FlashAttentionOption
     push.scale = float(std::numbers::log2e * (o.scale > 0 ? o.scale : 1 / std::sqrt(double(o.head_dim))));
     DispatchOptions dispatch;
     dispatch.flops = 4.0 * o.batch * o.query_rows * o.keys * o.heads * o.head_dim;
-    const uint32_t lane_queries = is_little(dispatch.flops) ? 4 : 16;
+    const uint32_t lane_queries = is_little(dispatch.flops) ? 4 : 8;
     dispatch.constants = group_constants(
         g.limits(), {{"kChunks", chunks}, {"kMostChunks", chunks <= 20 ? 20u : 64u}, {"kQueries", lane_queries}});
     const uint32_t excluded = o.head_dim > kMostFlashMatrixDim ? kFeatureCooperativeMatrix : 0u;

@@ -21,7 +21,7 @@ layout(binding = 0) uniform usamplerBuffer Q;          // [batch * query_rows, q
 layout(binding = 1) uniform usamplerBuffer Kv;         // [batch * key_rows, kv_ld]
 layout(binding = 2) writeonly buffer Y { uvec4 y[]; }; // [batch * query_rows, y_ld]
 
-layout(constant_id = 34) const uint kQueries = 16; // of a lane
+layout(constant_id = 34) const uint kQueries = 8; // of a lane: 4 or 8
 const uint kKeys = 32;
 
 float s[kQueries][kKeys]; // scores of a block, then their exponentials
