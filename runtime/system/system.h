@@ -90,8 +90,6 @@ bool process_is_gone(int64_t number); // no process of this machine has the numb
 std::string host_name();              // empty: unknown
 Path user_cache_folder();             // empty: none
 uint32_t usable_processors();         // of this process, at least 1
-// a variable of this process and its children, where it is not set; before there are threads
-void set_default_variable(const char* name, const char* value);
 void close_descriptor(int descriptor);
 
 } // namespace semrover::system

@@ -201,11 +201,6 @@ uint32_t usable_processors()
     return ::sched_getaffinity(0, sizeof set, &set) == 0 ? uint32_t(CPU_COUNT(&set)) : 1;
 }
 
-void set_default_variable(const char* name, const char* value)
-{
-    ::setenv(name, value, 0);
-}
-
 void close_descriptor(int descriptor)
 {
     ::close(descriptor);

@@ -256,12 +256,6 @@ uint32_t usable_processors()
     return std::max(1u, uint32_t(__builtin_popcountll(ours)));
 }
 
-void set_default_variable(const char* name, const char* value)
-{
-    if (!std::getenv(name))
-        ::_putenv_s(name, value);
-}
-
 void close_descriptor(int descriptor)
 {
     ::_close(descriptor);

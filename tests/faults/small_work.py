@@ -146,7 +146,7 @@ class SmallWork:
     def environment(self, name="", **variables):
         caches = {"MESA_SHADER_CACHE_DIR": os.environ.get("MESA_SHADER_CACHE_DIR", os.path.expanduser("~/.cache")),
                   "XDG_CACHE_HOME": str(self.out / "cache" if name.endswith("_cold") else self.folder / "cache")}
-        return {**os.environ, "LP_NATIVE_VECTOR_WIDTH": "256", **caches, "FAULT_FOLDER": str(self.folder), **variables}
+        return {**os.environ, **caches, "FAULT_FOLDER": str(self.folder), **variables}
 
     def start(self, line, more=(), name="", **variables):
         return subprocess.Popen(self.line(line, more), cwd=self.folder, env=self.environment(name, **variables),

@@ -15,8 +15,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <cstdlib>
-#include <filesystem>
 #include <iostream>
 #include <new>
 #include <optional>
@@ -30,25 +28,6 @@ namespace {
 void print_diagnostic(void*, const char* line)
 {
     print_stderr("{}\n", line);
-}
-
-// Mesa's lavapipe computes with 256 bits at a time unless it is told otherwise; matrix products gain half with 512. Its
-// cache does not tell code of one width from that of the other, and Mesa 26 crashes on it: so a cache of its own
-void prefer_wide_vectors()
-{
-#ifdef __x86_64__
-    if (!__builtin_cpu_supports("avx512f") || !__builtin_cpu_supports("avx512bw") ||
-        !__builtin_cpu_supports("avx512dq") || !__builtin_cpu_supports("avx512vl"))
-        return;
-    if (std::getenv("LP_NATIVE_VECTOR_WIDTH") || std::getenv("MESA_SHADER_CACHE_DIR"))
-        return;
-    const system::Path root = system::user_cache_folder(), cache = root / "semrover" / "vectors512";
-    std::error_code error;
-    if (root.empty() || (std::filesystem::create_directories(cache, error), error))
-        return;
-    system::set_default_variable("MESA_SHADER_CACHE_DIR", cache.string().c_str());
-    system::set_default_variable("LP_NATIVE_VECTOR_WIDTH", "512");
-#endif
 }
 
 void add_globals(CLI::App& app, Globals& globals)
@@ -167,7 +146,6 @@ constexpr int kMostDevices = 3; // that are lost, before the error stands
 // nothing thrown by the standard library or fmt leaves the program without a line and a code
 int run_program(int argc, char** argv, std::initializer_list<Command> commands)
 {
-    prefer_wide_vectors();
     system::prepare_streams();
     set_diagnostic_callback(print_diagnostic);
     watch_interrupts();
