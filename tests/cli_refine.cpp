@@ -27,6 +27,20 @@ TEST_F(CliRefine, a_run_writes_frames_and_latents_the_same_again_and_others_with
     EXPECT_EQ(run["settings"]["steps"], 3);
 }
 
+TEST_F(CliRefine, a_profile_has_all_parts_of_a_frame)
+{
+    ASSERT_EQ(refine("out", "--profile " + path("trace.json")).code, 0);
+    const Json trace = json_of(contents(folder_ / "trace.json"));
+    std::map<std::string, uint32_t> passes;
+    for (const Json& event : trace["traceEvents"])
+        if (event["ph"] == "X")
+            ++passes[event["name"]];
+    EXPECT_EQ(passes["picture_input"], kFrames); // encoded
+    EXPECT_EQ(passes["step_update"], 3 * kFrames);
+    EXPECT_EQ(passes["picture_bytes"], kFrames); // decoded
+    EXPECT_EQ(passes["scale_latent"], 2 * kFrames);
+}
+
 TEST_F(CliRefine, a_run_whose_device_is_lost_goes_on_with_a_new_one)
 {
     const auto whole = refined("whole");

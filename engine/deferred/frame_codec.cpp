@@ -118,7 +118,9 @@ Result<EncodedBuffer> FrameEncoder::encode_seen()
     SR_ASSERT(intake_, "an encoder of pictures that have not three channels");
     SR_CHECK(intake_->submit().map([](uint64_t) {}));
     SR_CHECK(executable_->submit().map([](uint64_t) {}));
-    SR_CHECK(check());
+    SR_CHECK(check()); // waits
+    SR_CHECK(intake_->collect_profile());
+    SR_CHECK(executable_->collect_profile());
     EncodedBuffer encoded;
     SR_TRY(encoded.latent, ends_->latent.read_rows(device_, ends_->size.pixels()));
     SR_TRY(encoded.visible, ends_->shares.read_rows(device_, ends_->size.pixels()));
