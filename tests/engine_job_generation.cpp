@@ -360,6 +360,15 @@ TEST(engine_job_generation, warns_where_a_distilled_model_is_sampled_in_another_
     const auto sampler = warnings([](GenerationOptions& o) { o.sampler = "ddim"; });
     ASSERT_EQ(sampler.size(), 1u);
     EXPECT_EQ(sampler[0], "the model was distilled for 4 steps of ddpm, not 4 of ddim");
+    folder.put("model_index.json",
+               R"({"defaults": {"num_inference_steps": 4, "guidance_scale": 1, "distilled_steps": 6}})");
+    EXPECT_TRUE(warnings([](GenerationOptions&) {}).empty());
+    EXPECT_TRUE(warnings([](GenerationOptions& o) { o.steps = 6; }).empty());
+    for (const int odd : {3, 7}) {
+        const auto said = warnings([&](GenerationOptions& o) { o.steps = odd; });
+        ASSERT_EQ(said.size(), 1u);
+        EXPECT_EQ(said[0], fmt::format("the model was distilled for 4 to 6 steps of ddpm, not {} of ddpm", odd));
+    }
 }
 
 } // namespace engine_job_generation_test

@@ -24,19 +24,21 @@ Status set_tiles(RegionOptions& regions, const TransformerConfig& config, double
     return {};
 }
 
-// a distilled network knows neither labels left out nor other timesteps than its own
+// a distilled network knows no labels left out; between its default and what it was trained for steps may be left out
 void warn_of_distilled(GenerationSettings& s)
 {
-    const int steps = s.model.defaults.distilled_steps;
-    if (!steps)
+    const int most = s.model.defaults.distilled_steps, fewest = std::min(s.model.defaults.num_inference_steps, most);
+    if (!most)
         return;
     if (s.guidance.scale != 1.f)
         s.model.warnings.push_back(
             fmt::format("the model is distilled: its one pass is guided already, and `cfg_scale` {} guides it twice",
                         s.guidance.scale));
-    if (s.steps != steps || s.model.scheduler.sampler != Sampler::ddpm)
-        s.model.warnings.push_back(fmt::format("the model was distilled for {} steps of ddpm, not {} of {}", steps,
-                                               s.steps, sampler_name(s.model.scheduler.sampler)));
+    if (s.steps < fewest || s.steps > most || s.model.scheduler.sampler != Sampler::ddpm)
+        s.model.warnings.push_back(
+            fmt::format("the model was distilled for {} steps of ddpm, not {} of {}",
+                        fewest < most ? fmt::format("{} to {}", fewest, most) : fmt::to_string(most), s.steps,
+                        sampler_name(s.model.scheduler.sampler)));
 }
 
 } // namespace
