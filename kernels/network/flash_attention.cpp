@@ -59,8 +59,9 @@ Tensor flash_attention(Graph& g, Tensor q, Tensor kv, const FlashAttentionOption
         g.limits(), {{"kChunks", chunks}, {"kMostChunks", chunks <= 20 ? 20u : 64u}, {"kQueries", lane_queries}});
     const uint32_t excluded = o.head_dim > kMostFlashMatrixDim ? kFeatureCooperativeMatrix : 0u;
     dispatch.variant = &g.variant(kernel::flash_attention, dispatch.constants, std::vector{q, kv}, excluded);
-    const bool on_lanes = dispatch.variant->constant("kLanes");
-    const Tile tile = on_lanes ? Tile{lane_queries * cpu_lanes(g.limits()), 1} : fixed_tile(*dispatch.variant);
+    const KernelVariant& variant = *dispatch.variant;
+    const Tile tile =
+        variant.constant("kLanes") ? Tile{lane_queries * variant.value("kLanes"), 1} : fixed_tile(variant);
     if (o.batch == 1)
         dispatch.banded = {"Q", "Y"};
     g.dispatch(kernel::flash_attention, {{"Q", q}, {"Kv", kv}, {"Y", y}}, push,

@@ -47,10 +47,10 @@ uint32_t step_of(const std::vector<uint32_t>& runs)
 
 // Where the lanes of a workgroup may lie otherwise, so many of them side by side, as few outputs as can be are computed
 // beyond the last row and column.
-MatmulTiles lane_tiles(const DeviceLimits& limits, const MatmulShape& shape)
+MatmulTiles lane_tiles(const MatmulShape& shape, uint32_t all)
 {
     constexpr uint32_t kLaneRows = 16;
-    const uint32_t all = cpu_lanes(limits), lane_cols = shape.narrow ? 8 : 16;
+    const uint32_t lane_cols = shape.narrow ? 8 : 16;
     const auto tile = [&](uint32_t across) { return Tile{kLaneRows * (all / across), lane_cols * across}; };
     const auto outputs = [&](uint32_t across) {
         return uint64_t(round_up(shape.rows, tile(across).rows)) * round_up(shape.cols, tile(across).cols);
@@ -109,14 +109,8 @@ bool is_little(double flops)
     return flops <= 1 << 23;
 }
 
-uint32_t cpu_lanes(const DeviceLimits& limits)
-{
-    return limits.subgroup_size >= 16 ? 16 : 8;
-}
-
 std::vector<ConstantValue> group_constants(const DeviceLimits& limits, std::vector<ConstantValue> others)
 {
-    others.push_back({"kLanes", cpu_lanes(limits)});
     if (const MatrixShape& m = limits.matrix; m.m)
         others.insert(others.end(), {{"kMatM", m.m}, {"kMatN", m.n}, {"kMatK", m.k}, {"kThreads", 4 * m.subgroup}});
     return others;
@@ -132,7 +126,7 @@ MatmulTiles matmul_tiles(const KernelVariant& variant, const DeviceLimits& limit
                          const MatmulTile* wanted)
 {
     if (variant.constant("kLanes"))
-        return lane_tiles(limits, shape);
+        return lane_tiles(shape, variant.value("kLanes"));
     const bool matrices = variant.features & kFeatureCooperativeMatrix;
     std::vector<RatedTile> tiles(std::begin(kSimtTiles), std::end(kSimtTiles));
     if (matrices)

@@ -49,11 +49,8 @@ bool has_room_for(const KernelVariant& variant, const DeviceLimits& limits, cons
 // Are operations so few that code unrolled less far is better? They end sooner than a driver has read the rest of it.
 bool is_little(double flops);
 
-// lanes of a workgroup of a variant for CPUs: a subgroup, or vectors of 512 bits would be half empty
-uint32_t cpu_lanes(const DeviceLimits& limits);
-
-// of every variant whose workgroups depend on the device: those for cooperative matrices (their shape, and threads of
-// four subgroups) and for CPUs (lanes); and others
+// of variants for cooperative matrices, whose workgroups depend on the device (shape, threads of four subgroups); and
+// others
 std::vector<ConstantValue> group_constants(const DeviceLimits& limits, std::vector<ConstantValue> others);
 
 } // namespace semrover

@@ -15,7 +15,7 @@ layout(constant_id = 0) const uint kTypeQ = kF16;
 layout(constant_id = 1) const uint kTypeKv = kF16;
 layout(constant_id = 2) const uint kTypeY = kF16;
 layout(constant_id = 3) const uint kMostChunks = 20; // room for head_dim / 8, in few sizes: compiling takes seconds
-layout(constant_id = 33) const uint kLanes = 8; // a subgroup: 8, or 16 where vectors have 512 bits
+layout(constant_id = 33) const uint kLanes = 8; // as vectors of 256 bits have
 layout(push_constant) uniform Push { FlashAttentionPush p; };
 layout(binding = 0) uniform usamplerBuffer Q;          // [batch * query_rows, q_ld]
 layout(binding = 1) uniform usamplerBuffer Kv;         // [batch * key_rows, kv_ld]

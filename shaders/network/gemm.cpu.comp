@@ -10,7 +10,7 @@
 #include "lib/pack.glsl"
 
 layout(local_size_x = 8, local_size_x_id = 33) in; // kLanes
-layout(constant_id = 33) const uint kLanes = 8; // a subgroup: 8, or 16 where vectors have 512 bits
+layout(constant_id = 33) const uint kLanes = 8; // as vectors of 256 bits have
 layout(constant_id = 2) const uint kTypeX = kF16;
 layout(constant_id = 3) const uint kTypeW = kQ8_0;
 layout(push_constant) uniform Push { GemmPush p; };
