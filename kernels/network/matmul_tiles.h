@@ -49,8 +49,7 @@ bool has_room_for(const KernelVariant& variant, const DeviceLimits& limits, cons
 // Are operations so few that code unrolled less far is better? They end sooner than a driver has read the rest of it.
 bool is_little(double flops);
 
-// of variants for cooperative matrices, whose workgroups depend on the device (shape, threads of four subgroups); and
-// others
+// what variants for cooperative matrices take from the device (shape, threads of four subgroups), and others
 std::vector<ConstantValue> group_constants(const DeviceLimits& limits, std::vector<ConstantValue> others);
 
 } // namespace semrover
