@@ -17,7 +17,7 @@ constexpr uint64_t kBandBytes = 64 << 20; // of V and m, about: larger images ar
 constexpr uint32_t kBandTiles = 32;       // a band is a multiple: rows of a GEMM tile on CPUs
 
 constexpr uint32_t kFewestTiles = 32;    // of an image; guidance has two
-constexpr uint64_t kFewestChannels = 48; // N C / (N + C)
+constexpr uint64_t kFewestChannels = 24; // N C / (N + C)
 
 struct Tiling {
     uint32_t across, per_image, total;
