@@ -60,8 +60,7 @@ Tensor flash_attention(Graph& g, Tensor q, Tensor kv, const FlashAttentionOption
     const uint32_t excluded = o.head_dim > kMostFlashMatrixDim ? kFeatureCooperativeMatrix : 0u;
     dispatch.variant = &g.variant(kernel::flash_attention, dispatch.constants, std::vector{q, kv}, excluded);
     const KernelVariant& variant = *dispatch.variant;
-    const Tile tile =
-        variant.constant("kLanes") ? Tile{lane_queries * variant.value("kLanes"), 1} : fixed_tile(variant);
+    const Tile tile = variant.name == "cpu" ? Tile{lane_queries * variant.local_size[0], 1} : fixed_tile(variant);
     if (o.batch == 1)
         dispatch.banded = {"Q", "Y"};
     g.dispatch(kernel::flash_attention, {{"Q", q}, {"Kv", kv}, {"Y", y}}, push,

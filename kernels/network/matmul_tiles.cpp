@@ -125,8 +125,8 @@ bool has_room_for(const KernelVariant& variant, const DeviceLimits& limits, cons
 MatmulTiles matmul_tiles(const KernelVariant& variant, const DeviceLimits& limits, const MatmulShape& shape,
                          const MatmulTile* wanted)
 {
-    if (variant.constant("kLanes"))
-        return lane_tiles(shape, variant.value("kLanes"));
+    if (variant.name == "cpu")
+        return lane_tiles(shape, variant.local_size[0]);
     const bool matrices = variant.features & kFeatureCooperativeMatrix;
     std::vector<RatedTile> tiles(std::begin(kSimtTiles), std::end(kSimtTiles));
     if (matrices)

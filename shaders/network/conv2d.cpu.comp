@@ -9,8 +9,7 @@
 #include "conv2d.h"
 #include "lib/pack.glsl"
 
-layout(local_size_x = 8, local_size_x_id = 33) in; // kLanes
-layout(constant_id = 33) const uint kLanes = 8; // as vectors of 256 bits have
+layout(local_size_x = 8) in; // lanes, as vectors of 256 bits have
 layout(constant_id = 2) const uint kTypeX = kF16;
 layout(constant_id = 8) const uint kTypeX2 = kF16;
 layout(constant_id = 7) const uint kTypeW = kQ8_0;
@@ -48,7 +47,7 @@ void main()
 {
     const uint lane = gl_LocalInvocationID.x;
     epilogue_group = 0;
-    const uint first_row = gl_WorkGroupID.x * (kLanes / p.col_lanes * kRows) + lane / p.col_lanes * kRows;
+    const uint first_row = gl_WorkGroupID.x * (gl_WorkGroupSize.x / p.col_lanes * kRows) + lane / p.col_lanes * kRows;
     const uint col = gl_WorkGroupID.y * (p.col_lanes * kCols) + lane % p.col_lanes * kCols;
     ConvPixel pixel[kRows];
     uint w_at[kCols];

@@ -10,12 +10,11 @@
 #include "flash_attention.h"
 #include "lib/pack.glsl"
 
-layout(local_size_x = 8, local_size_x_id = 33) in; // kLanes
+layout(local_size_x = 8) in; // lanes, as vectors of 256 bits have
 layout(constant_id = 0) const uint kTypeQ = kF16;
 layout(constant_id = 1) const uint kTypeKv = kF16;
 layout(constant_id = 2) const uint kTypeY = kF16;
 layout(constant_id = 3) const uint kMostChunks = 20; // room for head_dim / 8, in few sizes: compiling takes seconds
-layout(constant_id = 33) const uint kLanes = 8; // as vectors of 256 bits have
 layout(push_constant) uniform Push { FlashAttentionPush p; };
 layout(binding = 0) uniform usamplerBuffer Q;          // [batch * query_rows, q_ld]
 layout(binding = 1) uniform usamplerBuffer Kv;         // [batch * key_rows, kv_ld]
@@ -106,7 +105,7 @@ void add_values(uint v_at[kKeys])
 void main()
 {
     const uint head = gl_WorkGroupID.y * p.chunks * 8, image = gl_WorkGroupID.z;
-    const uint first_query = (gl_WorkGroupID.x * kLanes + gl_LocalInvocationID.x) * kQueries;
+    const uint first_query = (gl_WorkGroupID.x * gl_WorkGroupSize.x + gl_LocalInvocationID.x) * kQueries;
     const uint last_query = max(p.queries, p.first_row + 1) - p.first_row - 1; // rows behind it repeat it
     uint q_at[kQueries];
     [[unroll]] for (uint q = 0; q < kQueries; ++q) {

@@ -2,15 +2,14 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // y = epilogue(x w^T), for devices that are CPUs: no shared memory, no barrier; x and w come through texel buffers,
-// the fastest loads of lavapipe (docs/lab/benchmarks.md); K unrolled by eight columns; each lane owns 16 x 16 outputs, and
+// the fastest loads of lavapipe (docs/lab/benchmarks.md); K unrolled by 8 columns; each lane owns 16 x 16 outputs, and
 // p.col_lanes of them lie side by side. Correct at any subgroup size.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #include "gemm.h"
 #include "lib/pack.glsl"
 
-layout(local_size_x = 8, local_size_x_id = 33) in; // kLanes
-layout(constant_id = 33) const uint kLanes = 8; // as vectors of 256 bits have
+layout(local_size_x = 8) in; // lanes, as vectors of 256 bits have
 layout(constant_id = 2) const uint kTypeX = kF16;
 layout(constant_id = 3) const uint kTypeW = kQ8_0;
 layout(push_constant) uniform Push { GemmPush p; };
@@ -26,7 +25,7 @@ void main()
 {
     const uint lane = gl_LocalInvocationID.x;
     epilogue_group = gate_group = gl_WorkGroupID.z;
-    const uint row = gl_WorkGroupID.x * (kLanes / p.col_lanes * kRows) + lane / p.col_lanes * kRows;
+    const uint row = gl_WorkGroupID.x * (gl_WorkGroupSize.x / p.col_lanes * kRows) + lane / p.col_lanes * kRows;
     const uint col = gl_WorkGroupID.y * (p.col_lanes * kCols) + lane % p.col_lanes * kCols;
     uint x_at[kRows], w_at[kCols];
     [[unroll]] for (uint i = 0; i < kRows; ++i)
