@@ -19,17 +19,18 @@ namespace {
 constexpr const char* kExtensions[] = {"png", "jpg", "npy"};
 
 // numbers of the pictures in a folder, ascending; other names are not looked at
-std::vector<uint32_t> picture_numbers(const Path& folder)
+Result<std::vector<uint32_t>> picture_numbers(const Path& folder)
 {
+    SR_TRY(const std::vector<Path> files, list_files(folder));
     std::set<uint32_t> numbers;
-    for (const Path& path : list_files(folder).value_or(std::vector<Path>())) {
+    for (const Path& path : files) {
         const std::string stem = path.stem().string();
         const bool picture =
             std::ranges::any_of(kExtensions, [&](const char* e) { return path.extension() == std::string(".") + e; });
         if (picture && stem.size() == 6 && std::ranges::all_of(stem, ::isdigit))
             numbers.insert(uint32_t(std::stoul(stem)));
     }
-    return {numbers.begin(), numbers.end()};
+    return std::vector(numbers.begin(), numbers.end());
 }
 
 Status check_size(const Path& path, const ImageSize& expected)
@@ -46,7 +47,7 @@ Result<BufferCamera> open_camera(const Path& folder, std::string name)
     BufferCamera c;
     c.name = std::move(name);
     c.folder = folder;
-    const std::vector<uint32_t> numbers = picture_numbers(folder / "color");
+    SR_TRY(const std::vector<uint32_t> numbers, picture_numbers(folder / "color"));
     if (numbers.empty())
         return fail(ErrorCode::bad_input, "{} holds no pictures 000000.png, 000001.png, ..",
                     quote_path(folder / "color"));
@@ -85,9 +86,12 @@ Path frame_path(const Path& folder, const char* kind, uint32_t number, std::stri
 Result<Path> find_picture(const Path& folder, const char* kind, uint32_t number)
 {
     std::vector<Path> found;
-    for (const char* extension : kExtensions)
-        if (Path path = frame_path(folder, kind, number, extension); is_file(path))
+    for (const char* extension : kExtensions) {
+        Path path = frame_path(folder, kind, number, extension);
+        SR_TRY(const FileType type, examine(path));
+        if (type == FileType::regular)
             found.push_back(std::move(path));
+    }
     if (found.size() > 1)
         return fail(ErrorCode::bad_input, "{} and {} are one picture in two formats: expected one of them",
                     quote_path(found[0]), quote_path(found[1]));

@@ -9,6 +9,7 @@
 #include "engine/format/transforms.h"
 #include "engine/job/outputs.h"
 #include "engine/job/path_drawing.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/quote.h"
 
 #include <algorithm>
@@ -139,8 +140,7 @@ Status DrawingStore::check(const Path& folder, const CameraPath& path, bool repl
     std::vector<std::string> names = picture_folders(cameras_of(path));
     std::ranges::copy(single_files(), std::back_inserter(names));
     for (const std::string& name : names)
-        if (is_there(folder / name))
-            return fail(ErrorCode::usage, "{} exists; `replace` replaces what is there", quote_path(folder / name));
+        SR_CHECK(refuse_existing(folder / name, false));
     return {};
 }
 
@@ -149,8 +149,8 @@ Result<std::unique_ptr<DrawingStore>> DrawingStore::open(const Path& folder, con
 {
     SR_CHECK(check(folder, path, replace));
     for (const char* name : {kBoxesName, kObjectsName})
-        if (files.boxes && !replace && !is_file(folder / "run.json") && is_there(folder / name))
-            return fail(ErrorCode::usage, "{} exists; `replace` replaces what is there", quote_path(folder / name));
+        if (files.boxes && !is_file(folder / "run.json"))
+            SR_CHECK(refuse_existing(folder / name, replace));
     std::set<std::string> cameras = cameras_of(path);
     Json with_cameras = settings;
     with_cameras["cameras"] = cameras;
@@ -295,7 +295,8 @@ Status DrawingStore::finish(const Json& results)
 
 Status DrawingStore::restore_boxes() const
 {
-    return files_.boxes && !is_file(run_.path() / kBoxesName) ? files_.boxes->write(run_.path()) : Status();
+    SR_TRY(const FileType type, examine(run_.path() / kBoxesName));
+    return files_.boxes && type != FileType::regular ? files_.boxes->write(run_.path()) : Status();
 }
 
 } // namespace semrover

@@ -29,6 +29,11 @@ Status check_writable(const Path& path, bool replace)
     return AtomicFile::create(path).map([](const AtomicFile&) {});
 }
 
+bool is_written(const Path& path)
+{
+    return examine(path).value_or(FileType::none) == FileType::regular;
+}
+
 std::optional<Json> finished_results(const Path& folder, const Json& settings)
 {
     const auto run = run_in(folder, "finished", settings);

@@ -11,6 +11,7 @@ namespace semrover {
 // What cannot be written is refused now, not after an hour. usage when `path` exists and is not to be replaced;
 // bad_input when it cannot be written
 Status check_writable(const Path& path, bool replace);
+bool is_written(const Path& path); // a file is there, as far as can be told
 
 // Results of a run that is finished, with these settings (null: any); none where `folder` holds no such run.
 std::optional<Json> finished_results(const Path& folder, const Json& settings);

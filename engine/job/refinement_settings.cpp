@@ -7,6 +7,7 @@
 #include "engine/job/refinement.h"
 #include "engine/job/run_folder.h"
 #include "engine/job/version.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
 
@@ -324,8 +325,7 @@ Status Refinement::check_outputs(std::span<const Path> beside) const
     if (options.from_grid())
         files.push_back(out / "buffers");
     for (const Path& file : files)
-        if (is_there(file))
-            return fail(ErrorCode::usage, "{} exists; `replace` replaces it", quote_path(file));
+        SR_CHECK(refuse_existing(file, false));
     return {};
 }
 

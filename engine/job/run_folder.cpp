@@ -96,16 +96,13 @@ tl::unexpected<Error> other_settings(const Path& folder, bool finished)
 void remove_numbered(const Path& folder)
 {
     std::error_code ignored;
-    std::vector<Path> files;
-    for (const auto& entry : fs::directory_iterator(folder, ignored)) {
-        const std::string name = entry.path().filename().string(), stem = name.substr(0, name.find('.'));
+    for (const Path& file : list_files(folder).value_or(std::vector<Path>())) {
+        const std::string name = file.filename().string(), stem = name.substr(0, name.find('.'));
         static constexpr std::string_view kEndings[] = {".png", ".jpg", ".npy", ".bin", ".pcd", ".pcd.bin"};
         const bool ours = std::ranges::count(kEndings, name.substr(stem.size())) > 0;
         if (ours && stem.size() == 6 && std::ranges::all_of(stem, ::isdigit))
-            files.push_back(entry.path());
+            fs::remove(file, ignored);
     }
-    for (const Path& file : files)
-        fs::remove(file, ignored);
     fs::remove(folder, ignored); // stays if it holds anything else
     fs::remove(folder.parent_path(), ignored);
 }
@@ -164,10 +161,15 @@ Status RunFolder::refuse_links() const
     for (const std::string& name : names) {
         if (fs::is_symlink(path_ / name, ignored))
             return is_a_link(path_ / name);
-        fs::recursive_directory_iterator inside(path_ / name, ignored); // a file's, or an absent folder's: at its end
-        for (; inside != fs::recursive_directory_iterator(); inside.increment(ignored))
-            if (inside->is_symlink(ignored))
-                return is_a_link(inside->path());
+        SR_TRY(const FileType type, examine(path_ / name));
+        if (type != FileType::directory)
+            continue;
+        std::error_code error;
+        for (fs::recursive_directory_iterator i(path_ / name, error), end; !error && i != end; i.increment(error))
+            if (i->is_symlink(ignored))
+                return is_a_link(i->path());
+        if (error)
+            return fail(ErrorCode::bad_input, "cannot list {}: {}", quote_path(path_ / name), error.message());
     }
     return {};
 }
@@ -261,7 +263,9 @@ void RunFolder::drop_if_empty()
     for (const auto* names : {&contents_.pieces, &contents_.results})
         for (const std::string& name : *names)
             fs::remove(path_ / name, ignored); // a file, or a folder that is empty
-    fs::remove(path_, ignored);                // stays if it holds anything else
+    for (const std::string& name : contents_.numbered)
+        remove_numbered(path_ / name);
+    fs::remove(path_, ignored); // stays if it holds anything else
 }
 
 Status RunFolder::finish(const Json& results)

@@ -20,7 +20,7 @@ Result<std::unique_ptr<TileStore>> TileStore::open(const Path& folder, const Til
     std::unique_ptr<TileStore> store(new TileStore(folder, info));
     store->info_.metadata["world"] = hash_text(world);
     SR_CHECK(make_folder(folder));
-    store->read_only_ = !AtomicFile::create(folder / "writable");
+    store->writable_ = AtomicFile::create(folder / "writable").map([](const AtomicFile&) {});
     if (const auto before = TileFolder::open(folder))
         if (const auto of = before->metadata().find("world");
             of != before->metadata().end() && of->second == hash_text(world))
@@ -49,7 +49,7 @@ std::optional<VoxelGrid> TileStore::read(const TileIndex& tile, uint64_t key)
 
 Status TileStore::write(const TileIndex& tile, uint64_t key, VoxelGrid cells)
 {
-    if (read_only_)
+    if (!writable_)
         return {};
     SR_CHECK(status_);
     const TileEntry entry{cells.cells.size(), hash_text(key)};
@@ -79,7 +79,7 @@ Status TileStore::flush()
         status_ = files_->drain();
     waiting_.clear();
     SR_CHECK(status_);
-    if (!changed_ || read_only_ || entries_.empty())
+    if (!changed_ || !writable_ || entries_.empty())
         return {};
     SR_CHECK(write_tile_index(folder_, info_, entries_));
     changed_ = false;

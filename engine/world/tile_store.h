@@ -19,8 +19,8 @@ class TileStore {
     // Errors: bad_input, where the folder is not there and cannot be made
     static Result<std::unique_ptr<TileStore>> open(const Path& folder, const TileFolderInfo& info, uint64_t world);
 
-    bool read_only() const { return read_only_; }
-    const Status& status() const { return status_; } // of the writes so far
+    const Status& writable() const { return writable_; } // why it is only read
+    const Status& status() const { return status_; }     // of the writes so far
     // none: it is not there, or damaged
     std::optional<VoxelGrid> read(const TileIndex& tile, uint64_t key);
     // Hands a tile to a thread that writes it. After a failure nothing more is written, and each call returns its error
@@ -40,9 +40,9 @@ class TileStore {
     Path folder_;
     TileFolderInfo info_;
     std::map<TileIndex, TileEntry> entries_;
-    bool read_only_ = false, changed_ = false; // changed_: the index is not that of entries_
-    std::set<TileIndex> waiting_;              // handed over, and may not have their files yet
-    Status status_;                            // of the writes so far
+    bool changed_ = false;        // the index is not that of entries_
+    std::set<TileIndex> waiting_; // handed over, and may not have their files yet
+    Status writable_, status_;    // status_: of the writes so far
     std::unique_ptr<FileQueue> files_;
 };
 

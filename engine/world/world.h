@@ -110,6 +110,8 @@ class World {
     // Whether the store takes what is finished. A world goes on without: its tiles stay in memory, as far as budgets
     // allow, and a warning says so once
     Status stored() const { return tiles_->store() ? tiles_->store()->status() : Status(); }
+    // bad_input: the store can only be read
+    Status can_store() const { return tiles_->store() ? tiles_->store()->writable() : Status(); }
     // waits until the store has all that is finished, and its index; an error where it has not
     Status flush();
 

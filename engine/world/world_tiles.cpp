@@ -258,7 +258,7 @@ Status WorldTiles::write(const TileIndex& index, WorldTile& from)
     VoxelGrid file = from.cells;
     file.metadata = {{"tool", kProgram}};
     SR_CHECK(store_->write(index, key, std::move(file)));
-    from.stored = !store_->read_only();
+    from.stored = store_->writable().has_value();
     return {};
 }
 

@@ -20,16 +20,6 @@ namespace {
 constexpr size_t kMostListed = size_t(1) << 22; // of one folder
 constexpr size_t kPieceBytes = size_t(1) << 18; // stay in a cache
 
-using FileType = std::filesystem::file_type;
-
-// none: it cannot be examined. A name that is too long for any file is not found
-FileType type_of(const Path& path)
-{
-    std::error_code error;
-    const FileType type = std::filesystem::status(path, error).type();
-    return error == std::errc::filename_too_long ? FileType::not_found : type;
-}
-
 struct OpenFile {
     system::File file;
     uint64_t size;
@@ -141,25 +131,32 @@ Result<std::vector<Path>> list(const Path& folder, Part part, Test test)
 
 } // namespace
 
+Result<FileType> examine(const Path& path)
+{
+    if (const auto entry = find_in_memory(path))
+        return entry->folder ? FileType::directory : FileType::regular;
+    std::error_code error;
+    const FileType type = std::filesystem::status(path, error).type();
+    if (error == std::errc::filename_too_long)
+        return FileType::not_found;
+    if (type == FileType::none)
+        return fail(ErrorCode::bad_input, "cannot examine {}: {}", quote_path(path), error.message());
+    return type;
+}
+
 bool is_there(const Path& path)
 {
-    return find_in_memory(path) || type_of(path) != FileType::not_found;
+    return examine(path).value_or(FileType::regular) != FileType::not_found;
 }
 
 bool is_file(const Path& path)
 {
-    if (const auto entry = find_in_memory(path))
-        return !entry->folder;
-    const FileType type = type_of(path);
-    return type == FileType::regular || type == FileType::none;
+    return examine(path).value_or(FileType::regular) == FileType::regular;
 }
 
 bool is_folder(const Path& path)
 {
-    if (const auto entry = find_in_memory(path))
-        return entry->folder;
-    const FileType type = type_of(path);
-    return type == FileType::directory || type == FileType::none;
+    return examine(path).value_or(FileType::directory) == FileType::directory;
 }
 
 Result<std::vector<Path>> list_files(const Path& folder)
@@ -185,7 +182,7 @@ Result<std::vector<Path>> list_tree(const Path& folder)
 Status make_folder(const Path& path)
 {
     std::vector<Path> made;
-    for (Path above = path; !above.empty() && type_of(above) == FileType::not_found; above = above.parent_path())
+    for (Path above = path; !above.empty() && !is_there(above); above = above.parent_path())
         made.push_back(above);
     std::error_code error;
     std::filesystem::create_directories(path, error);

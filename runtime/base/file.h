@@ -28,6 +28,9 @@ using Path = std::filesystem::path;
 bool is_there(const Path& path);
 bool is_file(const Path& path); // a regular one, or a link to one
 bool is_folder(const Path& path);
+// For who looks elsewhere where nothing is there, or else refuses to write. bad_input: it cannot be examined
+using FileType = std::filesystem::file_type;
+Result<FileType> examine(const Path& path);
 
 // The regular files directly in a folder, sorted. bad_input: it cannot be listed.
 Result<std::vector<Path>> list_files(const Path& folder);

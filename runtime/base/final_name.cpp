@@ -23,13 +23,18 @@ Status refuse_existing(const Path& path, bool replace)
 {
     if (replace)
         return {};
-    std::error_code error;
-    const auto type = std::filesystem::status(path, error).type();
-    if (type == std::filesystem::file_type::none)
-        return fail(ErrorCode::bad_input, "cannot examine {}: {}", quote_path(path), error.message());
-    if (type != std::filesystem::file_type::not_found)
+    SR_TRY(const FileType type, examine(path));
+    if (type != FileType::not_found)
         return fail(ErrorCode::usage, "{} exists; `replace` replaces it", quote_path(path));
     return {};
+}
+
+Result<bool> has_folder(const Path& path)
+{
+    SR_TRY(const FileType type, examine(path));
+    if (type != FileType::not_found && type != FileType::directory)
+        return fail(ErrorCode::bad_input, "{} is a file; a folder is needed", quote_path(path));
+    return type == FileType::directory;
 }
 
 Status rename_whole(const Path& from, const Path& to)

@@ -16,9 +16,7 @@ Result<OutputFolder> OutputFolder::create(const Path& path, bool replace)
     f.path_ = fs::absolute(path, error);
     if (!f.path_.has_filename())
         f.path_ = f.path_.parent_path(); // "name/"
-    const bool there = is_there(f.path_);
-    if (there && !is_folder(f.path_))
-        return fail(ErrorCode::bad_input, "{} is a file; a folder is needed", quote_path(path));
+    SR_TRY(const bool there, has_folder(f.path_));
     if (there && !replace)
         return fail(ErrorCode::usage, "{} exists; -y replaces what is written there", quote_path(path));
     for (int attempt = 0; attempt < 100; ++attempt) { // a killed run with the same pid may have left its name

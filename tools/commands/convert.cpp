@@ -65,10 +65,9 @@ Status check_from(const ConvertArguments& o)
 bool is_scene(const ConvertArguments& o)
 {
     const Path in = o.model.in, out = o.model.out;
-    std::error_code ignored;
     if (!o.scene.input.from.empty() || !o.scene.to.empty())
         return true;
-    if (std::filesystem::is_directory(in, ignored) || (in.extension() == ".bin" && !has_scene_extension(out)))
+    if (is_folder(in) || (in.extension() == ".bin" && !has_scene_extension(out)))
         return false;
     return has_scene_extension(in) || has_scene_extension(out);
 }
@@ -85,7 +84,8 @@ Status convert(ConvertArguments& o, const Globals& globals)
             *o.command, meant,
             fmt::format("{}, which {} is taken for (--from says which format it has)", kind, quote_path(o.model.in)));
     };
-    if (is_camera_path(o.model.in)) {
+    SR_TRY(const bool trajectory, is_camera_path(o.model.in));
+    if (trajectory) {
         SR_CHECK(refuse_but({kDryRun, kPathNames, placement_options()}, "a trajectory"));
         o.path.placement.calibration = o.objects.calibration;
         if (o.path.placement.origin.empty())

@@ -67,7 +67,7 @@ struct ConvertPathOptions {
 void add_path_options(CLI::App& command, ConvertPathOptions& options);
 
 // is this a trajectory, and not a scene or a model? By what it holds, and of a file that is not there by its name
-bool is_camera_path(const Path& path);
+Result<bool> is_camera_path(const Path& path);
 
 // bad_input, for what is no path, no scene and no model: what it looks like, and what was expected
 Status refuse_unknown_input(const Path& path);

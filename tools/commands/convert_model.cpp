@@ -6,6 +6,7 @@
 #include "engine/model/model_index.h"
 #include "engine/model/renderer_model.h"
 #include "engine/model/weight_blocks.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/output_folder.h"
 #include "tools/cli/print_stderr.h"
@@ -123,7 +124,8 @@ Status plan_renderer(const ConvertModelOptions& o, Conversion& plan)
     SR_CHECK(plan_unet(o, m, plan));
     SR_CHECK(plan_vae(o, m, plan));
     plan.warnings = m.warnings;
-    if (m.ldm || !is_there(m.folder / "scheduler")) {
+    SR_TRY(const FileType scheduler, m.ldm ? FileType::not_found : examine(m.folder / "scheduler"));
+    if (scheduler == FileType::not_found) {
         const Json config = m.video() ? video_scheduler_json() : stable_diffusion_scheduler_json();
         plan.texts["scheduler/scheduler_config.json"] = config;
         plan.index["scheduler"] = {"diffusers", config["_class_name"]};
@@ -180,11 +182,10 @@ Status plan_copies(const Path& in, Conversion& plan)
     SR_CHECK(copy_adapters(in / "voxfield_transformer", plan));
     static constexpr const char* kKnown[] = {"renderer",           "unet",      "vae",         "voxfield_transformer",
                                              "voxfield_scheduler", "scheduler", "conditioning"};
-    std::error_code ignored;
-    for (const auto& entry : fs::directory_iterator(in, ignored))
-        if (entry.is_directory() && std::ranges::find(kKnown, entry.path().filename()) == std::end(kKnown))
-            plan.left_out.push_back(entry.path().filename().string());
-    std::ranges::sort(plan.left_out);
+    SR_TRY(const std::vector<Path> folders, list_folders(in));
+    for (const Path& folder : folders)
+        if (std::ranges::find(kKnown, folder.filename()) == std::end(kKnown))
+            plan.left_out.push_back(folder.filename().string());
     return {};
 }
 
@@ -208,8 +209,7 @@ Result<Conversion> plan_conversion(const ConvertModelOptions& o)
 {
     Conversion plan;
     const Path in = o.in;
-    std::error_code ignored;
-    const bool folder = fs::is_directory(in, ignored), transformer = folder && is_there(in / "voxfield_transformer");
+    const bool folder = is_folder(in), transformer = folder && is_there(in / "voxfield_transformer");
     if (transformer)
         SR_CHECK(plan_transformer(o, in / "voxfield_transformer", plan));
     if (!transformer || is_there(in / "renderer") || is_there(in / "unet"))
@@ -271,13 +271,8 @@ Status check_output(const ConvertModelOptions& o, const Path& out, const Globals
     std::error_code ignored;
     if (fs::equivalent(o.in, out, ignored))
         return fail(ErrorCode::usage, "IN and OUT are the same, {}", quote_path(out));
-    if (!is_there(out) || (fs::is_directory(out, ignored) && fs::is_empty(out, ignored)))
-        return {};
-    if (!fs::is_directory(out, ignored))
-        return fail(ErrorCode::bad_input, "{} is a file; a model is written as a folder", quote_path(out));
-    if (!globals.yes)
-        return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(out));
-    return {};
+    SR_TRY(const bool there, has_folder(out));
+    return there && fs::is_empty(out, ignored) ? Status() : refuse_existing(out, globals.yes);
 }
 
 void report(const Conversion& plan, const ConvertModelOptions& o, const Globals& globals)

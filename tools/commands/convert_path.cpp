@@ -60,10 +60,9 @@ Status check_output(const Path& in, const Path& out, const ConvertPathOptions& o
     std::error_code ignored;
     if (fs::equivalent(in, out, ignored))
         return fail(ErrorCode::usage, "IN and OUT are the same, {}", quote_path(out));
-    const bool folder = fs::is_directory(out, ignored);
-    if (format == PathFormat::colmap && is_there(out) && !folder)
-        return fail(ErrorCode::bad_input, "{} is a file; COLMAP's model is a folder", quote_path(out));
-    if (format != PathFormat::colmap && folder)
+    if (format == PathFormat::colmap)
+        SR_CHECK(has_folder(out).map([](bool) {}));
+    else if (is_folder(out))
         return fail(ErrorCode::bad_input, "{} is a folder, expected a file to write", quote_path(out));
     std::vector<Path> files{out};
     if (format == PathFormat::colmap)
@@ -199,10 +198,11 @@ void add_path_options(CLI::App& c, ConvertPathOptions& o)
     add_placement_options(c, o.placement);
 }
 
-bool is_camera_path(const Path& path)
+Result<bool> is_camera_path(const Path& path)
 {
     const Path extension = path.extension();
-    return find_path(path) || extension == ".tum" || extension == ".kitti" || (extension == ".json" && !is_there(path));
+    SR_TRY(const std::optional<FoundPath> found, find_path(path));
+    return found || extension == ".tum" || extension == ".kitti" || (extension == ".json" && !is_there(path));
 }
 
 Status refuse_unknown_input(const Path& path)

@@ -7,6 +7,7 @@
 #include "engine/job/outputs.h"
 #include "engine/job/version.h"
 #include "engine/splat/splat_scene.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
 #include "runtime/system/process.h"
@@ -144,7 +145,7 @@ bool GridRun::finished_before()
         return false;
     finished_ = finished_results(folder(), settings_, o_.output);
     for (const Path& path : written_files(!objects_->empty()))
-        if (!is_there(path))
+        if (!is_written(path))
             finished_.reset();
     return finished_.has_value();
 }
@@ -227,10 +228,9 @@ Status TilesRun::check() const
     if (o_.generation.dry_run)
         return {};
     // of a run, the settings say whether it is this one
-    if (TileFolder::is_one(o_.output) && !globals_.yes && !is_there(folder() / "run.json"))
-        return fail(ErrorCode::usage, "{} exists; -y replaces it", quote(o_.output));
-    if (is_there(o_.output) && !is_folder(o_.output))
-        return fail(ErrorCode::bad_input, "{} is a file; --along writes a folder of tiles", quote(o_.output));
+    SR_TRY(const bool there, has_folder(o_.output));
+    if (there && TileFolder::is_one(o_.output) && !is_there(folder() / "run.json"))
+        return refuse_existing(o_.output, globals_.yes);
     return {};
 }
 
@@ -264,7 +264,8 @@ Result<Json> TilesRun::settings() const
 {
     SR_TRY(const uint64_t grid, hash_input(o_.grid));
     SR_TRY(Json settings, settings_json(generation_, *device_, "generate --along", grid));
-    SR_TRY(const uint64_t path, hash_input(find_path(o_.along).value().path)); // read() has read it
+    SR_TRY(const std::optional<FoundPath> found, find_path(o_.along)); // read() has read it
+    SR_TRY(const uint64_t path, hash_input(found.value().path));
     settings["seed"] = o_.seed;
     settings["path"] = hash_text(path);
     if (const PathPlacement& p = placement_;
@@ -290,25 +291,26 @@ bool TilesRun::is_whole() const
 // removes the tiles in the output but those that are named
 void TilesRun::remove_tiles_but(const std::set<std::string>& names) const
 {
-    std::vector<Path> others;
     std::error_code ignored;
-    for (const auto& entry : fs::directory_iterator(o_.output, ignored)) {
-        const std::string name = entry.path().filename().string();
+    for (const Path& path : list_files(o_.output).value_or(std::vector<Path>())) {
+        const std::string name = path.filename().string();
         if (!names.contains(name) && name.starts_with("tile_") && name.ends_with(".sgrid"))
-            others.push_back(entry.path());
+            fs::remove(path, ignored);
     }
-    for (const Path& path : others)
-        fs::remove(path, ignored);
 }
 
 // a run that begins finds no tiles of another
 Status TilesRun::clear_output() const
 {
     SR_CHECK(make_folder(o_.output));
-    std::error_code ignored;
-    if (!globals_.yes && !fs::is_empty(o_.output, ignored))
+    std::error_code error;
+    const bool empty = fs::is_empty(o_.output, error);
+    if (!globals_.yes && !empty && !error)
         return fail(ErrorCode::usage, "{} is not empty; -y replaces the tiles in it", quote(o_.output));
-    fs::remove(Path(o_.output) / "index.json", ignored); // first: without it no tile is
+    if (!error)
+        fs::remove(Path(o_.output) / "index.json", error); // first: without it no tile is
+    if (error)
+        return fail(ErrorCode::bad_input, "cannot write to {}: {}", quote(o_.output), error.message());
     remove_tiles_but({});
     return {};
 }
@@ -334,6 +336,7 @@ Status TilesRun::open()
         request.store = o_.output;
     }
     SR_TRY(world_, open_world(*device_, std::move(request), std::move(labels_), display_.callbacks()));
+    SR_CHECK(world_->can_store());
     SR_CHECK(world_->follow(track_, o_.horizon));
     return run_ && !run_->resumed() ? run_->append({{"order", "tiles"}}) : Status();
 }

@@ -186,13 +186,13 @@ Report describe_weights(const SafetensorsSet& set, bool with_tensors, Totals& to
 // the component's weights, whatever their base name; none for a folder without (a scheduler, a tokenizer)
 Result<std::optional<SafetensorsSet>> open_weights(const Path& folder)
 {
-    std::error_code ignored;
-    std::set<Path> files;
+    SR_TRY(const std::vector<Path> all, list_files(folder));
+    std::vector<Path> files;
     bool pickle = false;
-    for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
-        const Path extension = entry.path().extension();
+    for (const Path& file : all) {
+        const Path extension = file.extension();
         if (extension == ".safetensors")
-            files.insert(entry.path());
+            files.push_back(file);
         pickle = pickle || extension == ".bin" || extension == ".pt" || extension == ".ckpt";
     }
     if (files.empty() && !pickle)
@@ -205,7 +205,7 @@ Result<std::optional<SafetensorsSet>> open_weights(const Path& folder)
     }
     SR_TRY(SafetensorsSet set, is_there(folder / "model.safetensors.index.json")
                                    ? SafetensorsSet::open(folder / "model.safetensors.index.json")
-                                   : SafetensorsSet::open(*files.begin()));
+                                   : SafetensorsSet::open(files.front()));
     return std::optional(std::move(set));
 }
 
@@ -394,8 +394,7 @@ Result<Report> describe_scene(const Path& path, const SceneInputOptions& options
 
 Result<Report> describe(const Path& path, const SceneInputOptions& input, const Globals& globals)
 {
-    std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored)) {
+    if (is_folder(path)) {
         if (TileFolder::is_one(path))
             return describe_scene(path, input);
         if (!is_model(path))
@@ -436,7 +435,8 @@ Result<InspectedFiles> sort_out(const InspectArguments& o)
         return fail(ErrorCode::usage, "--path, or two files, of which one is a trajectory");
     if (!o.path.empty())
         return InspectedFiles{o.path, o.file};
-    const bool first = o.input.from.empty() && find_path(o.file);
+    SR_TRY(const std::optional<FoundPath> found, find_path(o.file));
+    const bool first = o.input.from.empty() && found;
     if (o.other.empty())
         return first ? InspectedFiles{o.file, {}} : InspectedFiles{{}, o.file};
     return first ? InspectedFiles{o.file, o.other} : InspectedFiles{o.other, o.file};

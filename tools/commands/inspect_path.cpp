@@ -73,7 +73,7 @@ Meeting meeting_of(const CameraPath& path, const SceneInput& scene, const Bounds
 // of no frame that looks at the scene
 std::string advice(const Path& name, const CameraPath& path, const SceneInput& scene, const Meeting& m)
 {
-    const auto found = find_path(name);
+    const auto found = find_path(name).value_or(std::nullopt);
     if (found && found->format == PathFormat::kitti && scene.format == SceneFormat::semantickitti)
         return "--calib CALIB.TXT: KITTI's poses are the camera's, its voxels lie in the lidar's frame (of frame N: "
                "also "
@@ -102,7 +102,7 @@ Report metres(const Point3& position)
 
 Report describe_path(const Path& name, const CameraPath& path)
 {
-    const auto found = find_path(name);
+    const auto found = find_path(name).value_or(std::nullopt);
     std::set<std::string> cameras;
     for (const CameraFrame& frame : path.frames)
         if (!frame.camera.empty())

@@ -205,7 +205,7 @@ Status refine(const RefineArguments& o, const Globals& globals)
     if (!o.dry_run)
         SR_CHECK(r.check_outputs(video_files(o.videos, r.cameras)));
     const bool finished = r.was_finished() && !globals.yes;
-    const bool has_videos = finished && std::ranges::all_of(video_files(o.videos, r.cameras), is_there);
+    const bool has_videos = finished && std::ranges::all_of(video_files(o.videos, r.cameras), is_written);
     SR_TRY(const auto device, open_device(globals, o.profile));
     if (r.options.path)
         print_warnings(r.options.path->warnings, globals);

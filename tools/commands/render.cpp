@@ -107,7 +107,8 @@ Status render(const RenderArguments& o, const Globals& globals)
     SR_TRY(const auto device, open_device(globals, o.profile));
     print_warnings(options.path.warnings, globals);
     VideoOfFrames video;
-    const bool has_video = finished_results(o.output, Json()) && !globals.yes && is_there(o.video);
+    const bool finished = finished_results(o.output, Json()) && !globals.yes;
+    const bool has_video = finished && is_written(o.video);
     const bool wants_video = !o.video.empty() && !has_video;
     if (wants_video)
         options.picture = [&](const CameraFrame& frame, std::span<const uint8_t> pixels) {

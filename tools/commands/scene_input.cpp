@@ -124,8 +124,7 @@ Result<SceneInput> read_scene_input(const Path& path, const SceneInputOptions& o
 {
     SceneInput input;
     SR_TRY(const SceneGridOptions options, grid_options(o));
-    std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored)) {
+    if (is_folder(path)) {
         SR_CHECK(check_options(o, SceneFormat::sgrid, "a folder of tiles"));
         SR_TRY(input.grid, read_grid_or_tiles(path));
         return input;

@@ -3,6 +3,7 @@
 // semrover tile GRID -o DIR: cuts a grid into tiles; semrover tile DIR --join -o GRID: puts them together again
 #include "engine/job/outputs.h"
 #include "engine/scene/tiles.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/output_folder.h"
@@ -35,10 +36,9 @@ Status join(const TileArguments& o, const Globals& globals)
 Status make_room(const Path& output)
 {
     namespace fs = std::filesystem;
-    if (!is_there(output))
+    SR_TRY(const bool there, has_folder(output));
+    if (!there)
         return output.has_parent_path() ? make_folder(output.parent_path()) : Status();
-    if (!is_folder(output))
-        return fail(ErrorCode::usage, "{} is a file; tiles are written to a folder", quote_path(output));
     std::error_code error;
     const bool empty = fs::is_empty(output, error);
     if (!error && !empty)

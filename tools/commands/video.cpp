@@ -39,7 +39,7 @@ Result<Video> Video::create(const Path& path, uint32_t width, uint32_t height, i
     v.path_ = path;
     v.temporary_ = path.parent_path() / unfinished_name();
     const std::vector<std::string> arguments = {
-        "ffmpeg", "-loglevel", "error", "-y", "-f", "rawvideo", "-pixel_format", "rgb24", "-video_size",
+        "ffmpeg", "-loglevel", "error", "-xerror", "-y", "-f", "rawvideo", "-pixel_format", "rgb24", "-video_size",
         fmt::format("{}x{}", width, height), "-framerate", std::to_string(frames_per_second), "-i", "-",
         // H.264 in 4:2:0 wants even sides
         "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-f", "mp4",

@@ -4,6 +4,7 @@
 
 #include "engine/shards/shard_set.h"
 #include "engine/shards/ustar.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
 
@@ -107,9 +108,8 @@ Status empty_output(const Path& output, const std::vector<std::string>& files, b
 {
     SR_CHECK(make_folder(output));
     std::set<std::string> ours(files.begin(), files.end());
+    SR_CHECK(refuse_existing(output / kShardIndexName, replace));
     if (is_file(output / kShardIndexName)) {
-        if (!replace)
-            return fail(ErrorCode::usage, "{} exists; `replace` replaces it", quote_path(output / kShardIndexName));
         SR_TRY(const ShardIndex before, read_shard_index(output));
         SR_CHECK(remove_file(output / kShardIndexName));
         for (const ShardMember& file : before.files)
@@ -239,10 +239,14 @@ Status check_folders(const Path& folder, const Path& output)
     SR_TRY(const ShardsOrNone set, open_if_shards(folder));
     if (set)
         return fail(ErrorCode::bad_input, "{} is a shard set, expected a folder of pictures", quote_path(folder));
-    std::error_code error;
-    const Path from = fs::weakly_canonical(folder, error), to = fs::weakly_canonical(output, error);
+    std::error_code error, other_error;
+    const Path from = fs::weakly_canonical(folder, error), to = fs::weakly_canonical(output, other_error);
     const auto apart = std::ranges::mismatch(from, to);
-    if (error || apart.in1 == from.end() || apart.in2 == to.end())
+    error = error ? error : other_error;
+    if (error)
+        return fail(ErrorCode::bad_input, "cannot examine {} or {}: {}", quote_path(folder), quote_path(output),
+                    error.message());
+    if (apart.in1 == from.end() || apart.in2 == to.end())
         return fail(ErrorCode::usage, "{} and {}: expected folders of which neither is in the other",
                     quote_path(folder), quote_path(output));
     return {};

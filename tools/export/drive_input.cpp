@@ -78,15 +78,15 @@ Result<Path> DriveInput::color(size_t picture) const
     return fail(ErrorCode::bad_input, "{} is missing, and so is {}", quote_path(missing[1]), quote_path(missing[0]));
 }
 
-std::optional<Path> DriveInput::other(size_t picture, const char* kind) const
+Result<std::optional<Path>> DriveInput::other(size_t picture, const char* kind) const
 {
     const DriveRecord::Picture& p = record.pictures[picture];
     for (const Path& base : {folder / "buffers", folder}) {
-        const auto found = find_picture(camera_folder(base, p.camera), kind, p.number);
-        if (found && is_file(*found))
-            return *found;
+        SR_TRY(const Path found, find_picture(camera_folder(base, p.camera), kind, p.number));
+        if (is_file(found))
+            return std::optional(found);
     }
-    return std::nullopt;
+    return std::optional<Path>();
 }
 
 Result<ImageRgb8> DriveInput::read_color(size_t picture) const

@@ -39,8 +39,8 @@ struct DriveInput {
 
     // a frame that was refined, or else what splats look like; bad_input: it is not there
     Result<Path> color(size_t picture) const;
-    // "depth", "label" or "instance"; none where there is none
-    std::optional<Path> other(size_t picture, const char* kind) const;
+    // "depth", "label" or "instance"; none where there is none. bad_input: there are two
+    Result<std::optional<Path>> other(size_t picture, const char* kind) const;
 
     std::vector<Track> tracks() const;                    // by id
     double speed(const Track& track, size_t place) const; // m/s, from one place to the next; 0 of an only one

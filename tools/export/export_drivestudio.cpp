@@ -80,14 +80,15 @@ class DriveStudioScene {
         SR_TRY(const auto color, color_file(drive_, picture, true, options_.quality));
         SR_CHECK(put_file(folder_ / "images" / (name + ".jpg"), color));
         ++report_.pictures;
-        if (const auto file = drive_.other(picture, "label")) {
-            SR_TRY(const LabelImage labels, read_label_image(*file));
+        SR_TRY(const std::optional<Path> label_file, drive_.other(picture, "label"));
+        if (label_file) {
+            SR_TRY(const LabelImage labels, read_label_image(*label_file));
             SR_CHECK(write_mask("sky_masks", name, labels.size, labels.numbers,
                                 [](uint16_t label) { return label == kSkyClass; }));
         } else {
             no_sky_ = true;
         }
-        const auto file = drive_.other(picture, "instance");
+        SR_TRY(const std::optional<Path> file, drive_.other(picture, "instance"));
         if (!file || drive_.boxes.empty())
             return {};
         SR_TRY(const ImageGray16 image, read_png_gray16(*file));

@@ -184,7 +184,7 @@ class InfiniCubeClip {
     }
     Status add_labels(size_t picture, const std::string& camera, const std::string& sky, const std::string& semantic)
     {
-        const auto file = drive_.other(picture, "label");
+        SR_TRY(const std::optional<Path> file, drive_.other(picture, "label"));
         if (!file)
             return {};
         SR_TRY(const LabelImage labels, read_label_image(*file));
@@ -200,7 +200,7 @@ class InfiniCubeClip {
     }
     Status add_depth(size_t picture, const std::string& camera, const std::string& name)
     {
-        const auto file = drive_.other(picture, "depth");
+        SR_TRY(const std::optional<Path> file, drive_.other(picture, "depth"));
         if (!file)
             return {};
         SR_TRY(const DepthPicture depth, read_depth_picture(*file, drive_.record.depth_unit));
@@ -214,7 +214,7 @@ class InfiniCubeClip {
     }
     Status add_instances(size_t picture, const std::string& camera, const std::string& name)
     {
-        const auto file = drive_.other(picture, "instance");
+        SR_TRY(const std::optional<Path> file, drive_.other(picture, "instance"));
         if (!file)
             return {};
         SR_TRY(ImageGray16 image, read_png_gray16(*file));

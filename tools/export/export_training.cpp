@@ -65,11 +65,13 @@ Result<ExportReport> export_transforms(std::span<const DriveInput> drives, const
         n.color = picture_name(camera, "color", number, jpeg ? "jpg" : "png");
         SR_TRY(const auto color, color_file(drive, i, jpeg, options.quality));
         SR_CHECK(put_file(out / n.color, color));
-        for (const auto& [kind, name] : {std::pair("depth", &n.depth), std::pair("label", &n.label)})
-            if (const auto file = drive.other(i, kind)) {
-                *name = picture_name(camera, kind, number, file->extension().string().substr(1));
-                SR_CHECK(copy_of(*file, out / *name));
-            }
+        for (const auto& [kind, name] : {std::pair("depth", &n.depth), std::pair("label", &n.label)}) {
+            SR_TRY(const std::optional<Path> file, drive.other(i, kind));
+            if (!file)
+                continue;
+            *name = picture_name(camera, kind, number, file->extension().string().substr(1));
+            SR_CHECK(copy_of(*file, out / *name));
+        }
     }
     TransformsFiles files;
     files.pictures = [&](const std::string& camera, uint32_t number) { return names.at({camera, number}); };

@@ -43,7 +43,8 @@ Result<MapMask> empty_mask(const DriveInput& drive, double metres)
 
 Status add_picture(const DriveInput& drive, size_t picture, double metres, MapMask& mask)
 {
-    const auto label_file = drive.other(picture, "label"), depth_file = drive.other(picture, "depth");
+    SR_TRY(const std::optional<Path> label_file, drive.other(picture, "label"));
+    SR_TRY(const std::optional<Path> depth_file, drive.other(picture, "depth"));
     if (!label_file || !depth_file)
         return {};
     SR_TRY(const LabelImage labels, read_label_image(*label_file));

@@ -105,9 +105,11 @@ Status check_count(const std::vector<FramePictures>& pictures, const Path& poses
         if (p.depth.stem().string().size() == 6)
             ++used[p.depth.parent_path()];
     for (const auto& [folder, frames] : used) {
-        size_t found = 0;
-        for (const Path& path : list_files(folder).value_or(std::vector<Path>()))
-            found += path.extension() == ".png" || path.extension() == ".npy";
+        if (!is_there(folder))
+            continue;
+        SR_TRY(const std::vector<Path> files, list_files(folder));
+        const size_t found = size_t(std::ranges::count_if(
+            files, [](const Path& path) { return path.extension() == ".png" || path.extension() == ".npy"; }));
         if (found > frames)
             return fail(ErrorCode::bad_input, "{} holds {} pictures, {} has {} poses", quote_path(folder), found,
                         quote_path(poses), frames);

@@ -45,7 +45,7 @@ struct TimedFrames {
 
 // Whether a folder holds depth pictures that are named by time: depth.txt lists `time path` as TUM RGB-D's does, or the
 // names in depth/ are seconds with a point
-bool has_timed_pictures(const Path& folder);
+Result<bool> has_timed_pictures(const Path& folder);
 
 // Colours are those of rgb.txt, rgb/ or color/, labels those of label/; a kind that is not there has none.
 // Errors: bad_input, also when no picture has a pose of its moment

@@ -74,9 +74,10 @@ Status apply_options(const FusionFolderOptions& o, Intrinsics& k)
 }
 
 // the first picture below a folder of one of these names; empty: none
-Path first_picture(const Path& folder, std::initializer_list<const char*> kinds)
+Result<Path> first_picture(const Path& folder, std::initializer_list<const char*> kinds)
 {
-    for (const Path& path : list_tree(folder).value_or(std::vector<Path>())) {
+    SR_TRY(const std::vector<Path> files, list_tree(folder));
+    for (const Path& path : files) {
         const Path relative = path.parent_path().lexically_relative(folder);
         const bool picture = std::ranges::find(kPictureEndings, path.extension().string()) != std::end(kPictureEndings);
         if (picture && std::ranges::any_of(kinds, [&](const char* kind) {
@@ -84,16 +85,17 @@ Path first_picture(const Path& folder, std::initializer_list<const char*> kinds)
             }))
             return path;
     }
-    return {};
+    return Path();
 }
 
 Result<ImageSize> first_depth_size(const Path& folder)
 {
-    Path picture = first_picture(folder, {"depth"});
-    if (picture.empty())
-        for (const Path& map : list_tree(folder / kDepthMaps).value_or(std::vector<Path>()))
-            if (picture.empty() && map.extension() == ".bin")
-                picture = map;
+    SR_TRY(Path picture, first_picture(folder, {"depth"}));
+    if (picture.empty() && is_there(folder / kDepthMaps)) {
+        SR_TRY(const std::vector<Path> maps, list_tree(folder / kDepthMaps));
+        const auto map = std::ranges::find(maps, Path(".bin"), &Path::extension);
+        picture = map == maps.end() ? Path() : *map;
+    }
     if (picture.empty())
         return fail(ErrorCode::bad_input, "{}: no depth/*.png or depth/*.npy, expected 16-bit gray pictures there",
                     quote_path(folder));
@@ -103,7 +105,7 @@ Result<ImageSize> first_depth_size(const Path& folder)
 // of the pictures that a path without sizes means: the colours, where there are some
 Result<ImageSize> first_color_size(const Path& folder, ImageSize depth)
 {
-    const Path picture = first_picture(folder, {"color", "rgb", "images"});
+    SR_TRY(const Path picture, first_picture(folder, {"color", "rgb", "images"}));
     if (picture.empty())
         return depth;
     SR_TRY(const ImageRgb8 image, read_image_rgb8(picture));
@@ -137,8 +139,9 @@ Result<FusionFolder> FusionFolder::open(const Path& folder, const FusionFolderOp
     SR_TRY(f.classes_, PictureClasses::create(options.map));
     SR_CHECK(f.read_poses(poses, options));
     SR_CHECK(f.find_frames(poses, options));
-    if (std::ranges::none_of(f.pictures_, [](const FramePictures& p) { return is_file(p.depth); }))
-        f.lidar_ = find_lidar(folder);
+    if (std::ranges::none_of(f.pictures_, [](const FramePictures& p) { return is_file(p.depth); })) {
+        SR_TRY(f.lidar_, find_lidar(folder));
+    }
     SR_CHECK(f.check_pictures());
     if (f.lidar_) {
         SR_TRY(SweepFrames sweeps, SweepFrames::open(*f.lidar_, f.placed_, f.cameras_));
@@ -168,7 +171,7 @@ Status FusionFolder::read_poses(const Path& poses, const FusionFolderOptions& o)
         fallback.width = color.width;
         fallback.height = color.height;
     }
-    const std::optional<FoundPath> found = find_path(poses);
+    SR_TRY(const std::optional<FoundPath> found, find_path(poses));
     CameraPath path;
     if (size || !found || found->format != PathFormat::transforms) {
         SR_TRY(path, read_camera_path(poses, fallback));
@@ -197,7 +200,8 @@ Status FusionFolder::read_poses(const Path& poses, const FusionFolderOptions& o)
 Status FusionFolder::find_frames(const Path& poses, const FusionFolderOptions& o)
 {
     const bool named = poses.extension() == ".json" || !cameras_[0].picture.empty();
-    if (named || !has_timed_pictures(folder_)) {
+    SR_TRY(const bool by_time, named ? Result<bool>(false) : has_timed_pictures(folder_));
+    if (!by_time) {
         SR_TRY(pictures_, find_pictures(folder_, poses, cameras_));
         return {};
     }

@@ -51,14 +51,11 @@ std::vector<size_t> pictures_at(double time, const std::vector<CameraFrame>& cam
 
 } // namespace
 
-std::optional<Path> find_lidar(const Path& folder)
+Result<std::optional<Path>> find_lidar(const Path& folder)
 {
-    std::vector<Path> lidars;
-    std::error_code error;
-    for (const auto& entry : std::filesystem::directory_iterator(folder, error))
-        if (is_file(entry.path() / kSweepsName))
-            lidars.push_back(entry.path());
-    return lidars.empty() ? std::optional<Path>() : *std::ranges::min_element(lidars);
+    SR_TRY(const std::vector<Path> folders, list_folders(folder));
+    const auto lidar = std::ranges::find_if(folders, [](const Path& f) { return is_file(f / kSweepsName); });
+    return lidar == folders.end() ? std::optional<Path>() : *lidar;
 }
 
 Result<SweepFrames> SweepFrames::open(const Path& lidar, const Rigid& placed, const std::vector<CameraFrame>& cameras)

@@ -44,6 +44,6 @@ class SweepFrames {
 };
 
 // the folder of the first lidar, by name, that has sweeps; none: there is none
-std::optional<Path> find_lidar(const Path& folder);
+Result<std::optional<Path>> find_lidar(const Path& folder);
 
 } // namespace semrover

@@ -130,12 +130,14 @@ Result<std::vector<std::pair<size_t, size_t>>> associate_times(std::span<const d
     return pairs;
 }
 
-bool has_timed_pictures(const Path& folder)
+Result<bool> has_timed_pictures(const Path& folder)
 {
     if (is_file(folder / "depth.txt"))
         return true;
-    const auto paths = list_files(folder / "depth");
-    return paths && std::ranges::any_of(*paths, [](const Path& path) { return time_of_name(path).has_value(); });
+    if (!is_folder(folder / "depth"))
+        return false;
+    SR_TRY(const std::vector<Path> paths, list_files(folder / "depth"));
+    return std::ranges::any_of(paths, [](const Path& path) { return time_of_name(path).has_value(); });
 }
 
 Result<TimedFrames> find_timed_pictures(const Path& folder, const Path& poses, const std::vector<CameraFrame>& path)

@@ -83,6 +83,8 @@ bool take_run(const Path& from, const Path& to, const Path& run, const Json& sum
             !name.starts_with(".semrover-"))
             files.push_back(file);
     }
+    if (error)
+        return false;
     for (const Path& file : files)
         if (!take_file(from / file, to / file) && is_there(from / file))
             return false;

@@ -283,7 +283,7 @@ Status JobReader::add_files(const JobValue& table, std::string_view key, JobScen
         if (!is_file(objects))
             return refuse(*table.find("objects"), fmt::format("'objects': {} is not there", quote(objects)));
     }
-    const std::vector<Path> files = paths_like(resolve(pattern));
+    SR_TRY(const std::vector<Path> files, paths_like(resolve(pattern)));
     if (files.empty())
         return refuse(at, fmt::format("{}: no file is {}", quote(key), quote_path(resolve(pattern))));
     if (!name.empty() && files.size() > 1)

@@ -50,14 +50,9 @@ std::vector<const JobScene*> scenes_of_part(const JobFile& job, const TaskChoice
 // of the names and bytes of all files in it, through all levels
 Result<std::string> hash_tree(const Path& path)
 {
-    std::error_code error;
-    if (!fs::is_directory(path, error))
+    if (!is_folder(path))
         return hash_file(path).map(hash_text);
-    std::vector<Path> files;
-    for (fs::recursive_directory_iterator i(path, error), end; i != end; i.increment(error))
-        if (i->is_regular_file(error))
-            files.push_back(i->path());
-    std::ranges::sort(files);
+    SR_TRY(const std::vector<Path> files, list_tree(path));
     Hash all;
     for (const Path& file : files) {
         SR_TRY(const uint64_t one, hash_file(file));

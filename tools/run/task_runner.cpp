@@ -83,7 +83,10 @@ Status drop_pictures(const Path& folder, const std::vector<std::string>& kept)
             dropped.push_back(i->path());
     }
     for (const Path& path : dropped)
-        fs::remove_all(path, error);
+        if (!error)
+            fs::remove_all(path, error);
+    if (error)
+        return fail(ErrorCode::bad_input, "cannot remove pictures of {}: {}", quote_path(folder), error.message());
     return forget_missing_pictures(folder);
 }
 
@@ -185,7 +188,8 @@ Result<TaskRunner::Outcome> TaskRunner::attempt(const Task& task, const std::str
 
 Status TaskRunner::make_street(const JobScene& scene, const Path& folder) const
 {
-    if (is_file(folder / kStreetFiles[0])) // of an attempt before
+    SR_TRY(const FileType before, examine(folder / kStreetFiles[0]));
+    if (before == FileType::regular) // of an attempt before
         return {};
     const Path making = folder.parent_path() / "street.making";
     std::error_code error;
@@ -198,8 +202,8 @@ Status TaskRunner::make_street(const JobScene& scene, const Path& folder) const
     for (size_t i = std::size(kStreetFiles); i-- > 0;) // the labels last: they say that all is there
         fs::rename(making / kStreetFiles[i], folder / kStreetFiles[i], error);
     fs::remove_all(making, error);
-    return is_file(folder / kStreetFiles[0]) ? Status()
-                                             : fail(ErrorCode::bad_input, "no street came of {}", scene.name);
+    SR_TRY(const FileType made, examine(folder / kStreetFiles[0]));
+    return made == FileType::regular ? Status() : fail(ErrorCode::bad_input, "no street came of {}", scene.name);
 }
 
 std::vector<std::string> TaskRunner::scene_line(const Task& task, const Path& work) const

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/run/wildcard.h"
 
+#include "runtime/base/quote.h"
 #include "runtime/base/star_pattern.h"
 
 #include <algorithm>
@@ -57,8 +58,9 @@ bool matches(std::string_view pattern, std::string_view text)
     return matches_stars(pattern, text, take_one);
 }
 
-std::vector<Path> paths_like(const Path& pattern)
+Result<std::vector<Path>> paths_like(const Path& pattern)
 {
+    constexpr auto kDenied = fs::directory_options::skip_permission_denied;
     std::vector<Path> found{pattern.root_path()};
     std::error_code error;
     for (const Path& part : pattern.relative_path()) {
@@ -68,14 +70,21 @@ std::vector<Path> paths_like(const Path& pattern)
             if (name.find_first_of("*?[\\") == name.npos) {
                 if (fs::exists(folder / part, error))
                     next.push_back(folder / part);
+                if (error && error != std::errc::permission_denied)
+                    return fail(ErrorCode::bad_input, "cannot examine {}: {}", quote_path(folder / part),
+                                error.message());
                 continue;
             }
-            for (fs::directory_iterator i(folder.empty() ? "." : folder, error), end; !error && i != end;
+            if (!folder.empty() && !is_folder(folder))
+                continue;
+            for (fs::directory_iterator i(folder.empty() ? "." : folder, kDenied, error), end; !error && i != end;
                  i.increment(error)) {
                 const Path file = i->path().filename();
                 if (matches(name, file.string()) && (name[0] == '.' || file.string()[0] != '.'))
                     next.push_back(folder / file);
             }
+            if (error)
+                return fail(ErrorCode::bad_input, "cannot list {}: {}", quote_path(folder), error.message());
         }
         found = std::move(next);
     }

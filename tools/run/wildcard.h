@@ -11,7 +11,8 @@ namespace semrover {
 bool matches(std::string_view pattern, std::string_view text);
 
 // Paths that are there, sorted, as glob() of POSIX finds them: each part of the pattern stands for names in one folder,
-// and names that begin with a dot are found by such a pattern only.
-std::vector<Path> paths_like(const Path& pattern);
+// and names that begin with a dot are found by such a pattern only. What there is no permission to look at is left out.
+// bad_input: a folder cannot be listed
+Result<std::vector<Path>> paths_like(const Path& pattern);
 
 } // namespace semrover

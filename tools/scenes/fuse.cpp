@@ -61,8 +61,7 @@ Status resolve(FuseArguments& o, const Globals& globals)
     o.input.poses = o.poses;
     SR_TRY(o.input.placement, placement_of(o.placement));
     o.input.map = o.map;
-    if (is_there(o.output) && !is_folder(o.output))
-        return fail(ErrorCode::usage, "{} is a file, expected a folder", quote_path(o.output));
+    SR_CHECK(has_folder(o.output).map([](bool) {}));
     for (const Path& path : Outputs(o.output, o.mesh_format).all())
         SR_CHECK(refuse_existing(path, globals.yes));
     return {};

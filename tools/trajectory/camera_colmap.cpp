@@ -177,12 +177,13 @@ Status write_colmap(const Path& folder, const CameraPath& cameras, const Splats&
                        colmap_picture_name(frame.camera, counts[frame.camera]++, counts.size(), extension));
     }
     std::error_code error;
-    const bool made = std::filesystem::create_directories(folder, error);
+    const bool made = !is_there(folder);
+    SR_CHECK(make_folder(folder));
     std::vector<Path> written;
     for (const auto& [file, text] : {std::pair{"points3D.txt", points_text(points)}, // readers ask for it
                                      {"cameras.txt", camera_text},
                                      {"images.txt", image_text}}) {
-        const bool there = std::filesystem::exists(folder / file, error);
+        const bool there = is_there(folder / file);
         const Status status = write_file_atomically(folder / file, text);
         if (!there && status)
             written.push_back(folder / file);

@@ -111,7 +111,7 @@ Status refuse_colmap_file(const Path& path)
 Result<CameraPath> read_camera_path(const Path& path, const PathLens& lens, const PathPlacement& placement)
 {
     SR_CHECK(refuse_colmap_file(path));
-    const std::optional<FoundPath> found = find_path(path);
+    SR_TRY(const std::optional<FoundPath> found, find_path(path));
     if (!found)
         SR_CHECK(refuse_unknown_path(path));
     SR_TRY(ReadPath read, read_found(*found, lens));

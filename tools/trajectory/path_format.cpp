@@ -107,19 +107,29 @@ std::optional<PathFormat> format_of_text(std::string_view text)
     }
 }
 
-std::optional<FoundPath> find_in_folder(const Path& folder)
+Result<std::optional<FoundPath>> find_in_folder(const Path& folder)
 {
     for (const char* model : {".", "sparse/0", "sparse", "0", "colmap/sparse/0"})
-        for (const char* file : {"cameras.bin", "cameras.txt", "images.txt"})
-            if (const Path at = (folder / model).lexically_normal(); is_there(at / file))
-                return FoundPath{PathFormat::colmap, at};
-    for (const char* file : {"poses.txt", "transforms.json", "poses.json", "ego_pose.json"})
-        if (is_file(folder / file))
+        for (const char* file : {"cameras.bin", "cameras.txt", "images.txt"}) {
+            const Path at = (folder / model).lexically_normal();
+            SR_TRY(const FileType type, examine(at / file));
+            if (type != FileType::not_found)
+                return std::optional(FoundPath{PathFormat::colmap, at});
+        }
+    for (const char* file : {"poses.txt", "transforms.json", "poses.json", "ego_pose.json"}) {
+        SR_TRY(const FileType type, examine(folder / file));
+        if (type == FileType::regular)
             return find_path(folder / file);
-    for (const Path& at : {folder, folder / "pose"})
-        if (is_folder(at) && !pose_files_in(at).empty())
-            return FoundPath{PathFormat::pose_files, at};
-    return std::nullopt;
+    }
+    for (const Path& at : {folder, folder / "pose"}) {
+        SR_TRY(const FileType type, examine(at));
+        if (type != FileType::directory)
+            continue;
+        SR_TRY(const std::vector<Path> files, pose_files_in(at));
+        if (!files.empty())
+            return std::optional(FoundPath{PathFormat::pose_files, at});
+    }
+    return std::optional<FoundPath>();
 }
 
 std::string keys_of(const Json& object)
@@ -194,17 +204,18 @@ std::optional<PathFormat> path_format_of(std::string_view name)
     return PathFormat(found - std::begin(kPathNames));
 }
 
-std::optional<FoundPath> find_path(const Path& path)
+Result<std::optional<FoundPath>> find_path(const Path& path)
 {
-    if (is_folder(path))
+    SR_TRY(const FileType type, examine(path));
+    if (type == FileType::not_found)
+        return std::optional<FoundPath>();
+    if (type == FileType::directory)
         return find_in_folder(path);
-    const auto file = MappedFile::open(path);
-    if (!file)
-        return std::nullopt;
+    SR_TRY(const MappedFile file, MappedFile::open(path));
     std::optional<PathFormat> format;
     if (path.extension() == ".json")
-        format = format_of_json(beginning_of(*file, file->bytes().size()));
-    else if (const std::string_view text = beginning_of(*file, kBeginning); !holds(text, std::string_view("\0", 1)))
+        format = format_of_json(beginning_of(file, file.bytes().size()));
+    else if (const std::string_view text = beginning_of(file, kBeginning); !holds(text, std::string_view("\0", 1)))
         format = format_of_text(text);
     return format ? std::optional(FoundPath{*format, path}) : std::nullopt;
 }

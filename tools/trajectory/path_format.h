@@ -33,14 +33,15 @@ struct FoundPath {
     Path path; // what is read: the file or folder itself, or what a folder holds, such as sparse/0 of a project
 };
 
-// none for what is no camera path, and for what cannot be read
-std::optional<FoundPath> find_path(const Path& path);
+// none for what is no camera path, or not there; bad_input: it cannot be read
+Result<std::optional<FoundPath>> find_path(const Path& path);
 
 // bad_input: what the file or folder looks like, and what was expected: a camera path, or `others`
 Status refuse_unknown_path(const Path& path, std::string_view others = "");
 
 // Files of a 4x4 matrix each, by the numbers in their names: NNN.txt of ScanNet, frame-NNNNNN.pose.txt of 7-Scenes.
-// Where names end in .pose.txt, others do not count. Empty where the first of them is no matrix.
-std::vector<Path> pose_files_in(const Path& folder);
+// Where names end in .pose.txt, others do not count. Empty where the first of them is no matrix. bad_input: the folder
+// cannot be listed, or that file not read
+Result<std::vector<Path>> pose_files_in(const Path& folder);
 
 } // namespace semrover

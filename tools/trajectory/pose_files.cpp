@@ -3,6 +3,7 @@
 #include "tools/trajectory/path_format.h"
 
 #include "runtime/base/quote.h"
+#include "runtime/base/text_start.h"
 #include "tools/trajectory/camera_path.h"
 #include "tools/trajectory/camera_text.h"
 
@@ -16,10 +17,8 @@ namespace {
 constexpr uint64_t kMaxPoseBytes = 4096;
 
 // 16 numbers, finite or not
-Result<std::vector<double>> read_sixteen(const Path& path)
+Result<std::vector<double>> sixteen_of(std::string_view text, const std::string& name)
 {
-    const std::string name = quote_path(path);
-    SR_TRY(const std::string text, read_text_file(path, kMaxPoseBytes));
     std::vector<double> values;
     for (TextLines lines(text); lines.next();) {
         SR_TRY(const std::vector<double> row, numbers_of_words(semrover::words_of(lines.line(), 16), name));
@@ -28,6 +27,12 @@ Result<std::vector<double>> read_sixteen(const Path& path)
     if (values.size() != 16)
         return fail(ErrorCode::bad_input, "{}: expected the 16 numbers of a 4x4 matrix, found {}", name, values.size());
     return values;
+}
+
+Result<std::vector<double>> read_sixteen(const Path& path)
+{
+    SR_TRY(const std::string text, read_text_file(path, kMaxPoseBytes));
+    return sixteen_of(text, quote_path(path));
 }
 
 // what the pictures of the same frame are called, without their ending: "0" of 0.txt, "frame-000000" of
@@ -55,13 +60,11 @@ std::optional<uint64_t> number_in_name(const Path& file)
 
 } // namespace
 
-std::vector<Path> pose_files_in(const Path& folder)
+Result<std::vector<Path>> pose_files_in(const Path& folder)
 {
-    const auto listed = list_files(folder);
-    if (!listed)
-        return {};
+    SR_TRY(const std::vector<Path> listed, list_files(folder));
     std::vector<Path> files, poses;
-    for (const Path& file : *listed) {
+    for (const Path& file : listed) {
         const std::string name = file.filename().string();
         if (name.ends_with(".pose.txt"))
             poses.push_back(file);
@@ -71,15 +74,18 @@ std::vector<Path> pose_files_in(const Path& folder)
     if (!poses.empty())
         files = std::move(poses);
     std::ranges::sort(files, natural_less, [](const Path& file) { return file.filename().string(); });
-    if (files.empty() || !read_sixteen(files.front()))
-        return {};
-    return files;
+    if (files.empty())
+        return files;
+    SR_TRY(const MappedFile first, MappedFile::open(files.front()));
+    const std::string_view bytes(reinterpret_cast<const char*>(first.bytes().data()), first.bytes().size());
+    const auto text = text_after_mark(bytes, "");
+    return bytes.size() <= kMaxPoseBytes && text && sixteen_of(*text, "") ? files : std::vector<Path>();
 }
 
 Result<CameraPath> read_pose_files(const Path& folder, const Intrinsics& lens)
 {
     CameraPath path{.frames = {}, .numbered = true, .body = {}, .warnings = {}};
-    const std::vector<Path> files = pose_files_in(folder);
+    SR_TRY(const std::vector<Path> files, pose_files_in(folder));
     for (const Path& file : files) {
         SR_TRY(const std::vector<double> values, read_sixteen(file));
         if (!std::ranges::all_of(values, [](double v) { return std::isfinite(v); }))

@@ -63,20 +63,16 @@ Result<std::vector<Path>> find_cases(const std::vector<std::string>& arguments)
     std::vector<Path> cases;
     for (const std::string& text : arguments) {
         const Path given = text, argument = given.has_filename() ? given : given.parent_path(); // "case/" is "case"
-        std::error_code error;
-        if (fs::exists(argument / "case.json", error)) {
+        if (is_there(argument / "case.json")) {
             cases.push_back(argument);
             continue;
         }
-        std::vector<Path> inside;
-        for (const auto& entry : fs::directory_iterator(argument, error))
-            if (is_there(entry.path() / "case.json"))
-                inside.push_back(entry.path());
+        SR_TRY(std::vector<Path> inside, list_folders(argument));
+        std::erase_if(inside, [](const Path& folder) { return !is_there(folder / "case.json"); });
         if (inside.empty())
             return fail(ErrorCode::bad_input,
                         "{}: expected a golden case (a folder with case.json) or a folder of cases",
                         quote_path(argument));
-        std::ranges::sort(inside);
         cases.insert(cases.end(), inside.begin(), inside.end());
     }
     return cases;

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // semrover view GRID -m MODEL: a window on a street that is generated around the camera; --screenshot: a picture of it
+#include "runtime/base/final_name.h"
 #include "runtime/base/json.h"
 #include "runtime/base/quote.h"
 #include "tools/cli/commands.h"
@@ -98,8 +99,7 @@ Result<view::Script> script_of(const ViewArguments& o, const Globals& globals)
     }
     if (o.screenshot.empty())
         return script;
-    if (is_there(o.screenshot) && !globals.yes)
-        return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(o.screenshot));
+    SR_CHECK(refuse_existing(o.screenshot, globals.yes));
     SR_CHECK(AtomicFile::create(o.screenshot).map([](const AtomicFile&) {})); // not only after minutes of generating
     SR_CHECK(script.add("wait", "--screenshot"));
     SR_CHECK(script.add_shot(o.screenshot, "--screenshot"));

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: semrover authors
 // SPDX-License-Identifier: Apache-2.0
 // what mouse, panels and scripts ask of the viewer
-#include "runtime/base/quote.h"
+#include "runtime/base/final_name.h"
 #include "tools/view/viewer.h"
 
 namespace semrover::view {
@@ -73,9 +73,7 @@ void Viewer::play()
 
 Status Viewer::check_replace(const Path& path) const
 {
-    if (is_there(path) && !request_.replace)
-        return fail(ErrorCode::usage, "{} exists; -y replaces it", quote_path(path));
-    return {};
+    return refuse_existing(path, request_.replace);
 }
 
 Status Viewer::save_path(const Path& path) const
