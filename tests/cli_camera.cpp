@@ -81,7 +81,7 @@ TEST(CliCamera, what_cannot_be_converted_is_told_in_one_line)
     expect_error(convert(kDrive, folder / "a.dat"), 2, "does not show which format is meant");
     expect_error(convert(kDrive, kDrive), 2, "IN and OUT are the same");
     expect_error(convert(kDrive, folder.put("there.tum", "")), 2, "exists; -y replaces it");
-    expect_error(convert(kDrive, folder / "there.tum", "--path-format colmap"), 3, "COLMAP's model is a folder");
+    expect_error(convert(kDrive, folder / "there.tum", "--path-format colmap"), 3, "is a file; a folder is needed");
     expect_error(convert((folder / "none.tum").string(), folder / "b.tum"), 3, "No such file");
     expect_error(convert(folder.put("bad.tum", "0 0 0 0 0 0 0 2").string(), folder / "b.tum"), 3,
                  "expected a quaternion of norm 1, found 2");
@@ -311,7 +311,7 @@ TEST(CliCamera, a_drawing_that_is_done_is_done_and_another_wants_yes)
     for (const char* theirs : {"tele/color", "front/alpha", "top.png", "transforms.json"}) {
         fs::remove_all(d.folder / "theirs");
         fs::create_directories(d.folder / "theirs" / theirs);
-        expect_error(render(d.folder / "theirs", rig), 2, "exists; -y replaces what is there");
+        expect_error(render(d.folder / "theirs", rig), 2, "exists; -y replaces it");
     }
 }
 
