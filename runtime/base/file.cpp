@@ -20,6 +20,24 @@ namespace {
 constexpr size_t kMostListed = size_t(1) << 22; // of one folder
 constexpr size_t kPieceBytes = size_t(1) << 18; // stay in a cache
 
+// none: it cannot be examined
+FileType type_of(const Path& path, std::error_code& error)
+{
+    if (const auto entry = find_in_memory(path))
+        return entry->folder ? FileType::directory : FileType::regular;
+    return std::filesystem::status(path, error).type();
+}
+
+// unknown: what stands for what cannot be examined. A name that is too long for any file is not there
+FileType type_or(FileType unknown, const Path& path)
+{
+    std::error_code error;
+    const FileType type = type_of(path, error);
+    if (error == std::errc::filename_too_long)
+        return FileType::not_found;
+    return type == FileType::none ? unknown : type;
+}
+
 struct OpenFile {
     system::File file;
     uint64_t size;
@@ -133,12 +151,8 @@ Result<std::vector<Path>> list(const Path& folder, Part part, Test test)
 
 Result<FileType> examine(const Path& path)
 {
-    if (const auto entry = find_in_memory(path))
-        return entry->folder ? FileType::directory : FileType::regular;
     std::error_code error;
-    const FileType type = std::filesystem::status(path, error).type();
-    if (error == std::errc::filename_too_long)
-        return FileType::not_found;
+    const FileType type = type_of(path, error);
     if (type == FileType::none)
         return fail(ErrorCode::bad_input, "cannot examine {}: {}", quote_path(path), error.message());
     return type;
@@ -146,17 +160,17 @@ Result<FileType> examine(const Path& path)
 
 bool is_there(const Path& path)
 {
-    return examine(path).value_or(FileType::regular) != FileType::not_found;
+    return type_or(FileType::none, path) != FileType::not_found;
 }
 
 bool is_file(const Path& path)
 {
-    return examine(path).value_or(FileType::regular) == FileType::regular;
+    return type_or(FileType::regular, path) == FileType::regular;
 }
 
 bool is_folder(const Path& path)
 {
-    return examine(path).value_or(FileType::directory) == FileType::directory;
+    return type_or(FileType::directory, path) == FileType::directory;
 }
 
 Result<std::vector<Path>> list_files(const Path& folder)
