@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstring>
 #include <mutex>
+#include <new>
 
 namespace semrover {
 
@@ -103,17 +104,20 @@ std::string refusal(const VulkanCalls& vk, VkPhysicalDevice physical, const VkPh
     return compute_queue_family(vk, physical) ? "" : "has no compute queue";
 }
 
-// enumerate(&count, extensions): as Vulkan's two functions do, of an instance or of a device
+// enumerate(&count, extensions): as Vulkan's two functions do, of an instance or of a device. Throws std::bad_alloc
+// where the driver has no memory, as where we have none: what it does not list then is not absent
 template <typename Enumerate>
 bool lists(const char* name, Enumerate enumerate)
 {
     uint32_t count = 0;
-    if (enumerate(&count, nullptr) != VK_SUCCESS)
-        return false;
+    VkResult result = enumerate(&count, nullptr);
     std::vector<VkExtensionProperties> all(count);
-    if (enumerate(&count, all.data()) != VK_SUCCESS)
-        return false;
-    return std::ranges::any_of(all, [&](const auto& e) { return !std::strcmp(e.extensionName, name); });
+    if (result == VK_SUCCESS)
+        result = enumerate(&count, all.data());
+    if (result == VK_ERROR_OUT_OF_HOST_MEMORY || result == VK_ERROR_OUT_OF_DEVICE_MEMORY)
+        throw std::bad_alloc();
+    return result == VK_SUCCESS &&
+           std::ranges::any_of(all, [&](const auto& e) { return !std::strcmp(e.extensionName, name); });
 }
 
 bool has_instance_extension(const char* name)

@@ -42,7 +42,8 @@ RESULTS = collections.defaultdict(lambda: [DEVICE_MEMORY], {
     "vkCreatePipelineCache": [HOST_MEMORY],
     "vkGetPipelineCacheData": [HOST_MEMORY],
 })
-NAMES_IT = re.compile(r"vk[A-Z]\w+|the device refused \d+ bytes|no Vulkan driver: VK_\w+|did not finish a submit")
+NAMES_IT = re.compile(r"vk[A-Z]\w+|the device refused \d+ bytes|no Vulkan driver: VK_\w+|did not finish a submit|"
+                      r"memory is exhausted|no host memory")
 
 
 def digest(folder, *patterns):

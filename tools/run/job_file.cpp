@@ -292,8 +292,9 @@ Status JobReader::add_files(const JobValue& table, std::string_view key, JobScen
         std::string own = file.filename().string();
         own = name.empty() ? own.substr(0, own.find('.')) : name;
         std::error_code error;
-        const uint64_t bytes = fs::is_directory(file, error) ? 0 : fs::file_size(file, error);
-        SR_CHECK(add_scene(at, {.source = source, .name = own, .file = file, .objects = objects, .weight = bytes}));
+        const uint64_t bytes = is_folder(file) ? 0 : fs::file_size(file, error);
+        SR_CHECK(add_scene(
+            at, {.source = source, .name = own, .file = file, .objects = objects, .weight = error ? 0 : bytes}));
     }
     return {};
 }

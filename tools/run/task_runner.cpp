@@ -3,6 +3,7 @@
 #include "tools/run/task_runner.h"
 
 #include "engine/voxfield/voxfield_model.h"
+#include "runtime/base/final_name.h"
 #include "runtime/base/hash.h"
 #include "runtime/base/quote.h"
 #include "runtime/system/host_name.h"
@@ -200,10 +201,9 @@ Status TaskRunner::make_street(const JobScene& scene, const Path& folder) const
     SR_CHECK(run_scenes_command(line));
     SR_CHECK(make_folder(folder));
     for (size_t i = std::size(kStreetFiles); i-- > 0;) // the labels last: they say that all is there
-        fs::rename(making / kStreetFiles[i], folder / kStreetFiles[i], error);
+        SR_CHECK(rename_whole(making / kStreetFiles[i], folder / kStreetFiles[i]));
     fs::remove_all(making, error);
-    SR_TRY(const FileType made, examine(folder / kStreetFiles[0]));
-    return made == FileType::regular ? Status() : fail(ErrorCode::bad_input, "no street came of {}", scene.name);
+    return {};
 }
 
 std::vector<std::string> TaskRunner::scene_line(const Task& task, const Path& work) const
