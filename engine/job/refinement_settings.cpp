@@ -69,18 +69,20 @@ Status find_windows(const Refinement& r, RefinedCamera& c)
     return {};
 }
 
-// the path that lies beside buffers, if it is theirs
-void take_path_beside(RefinementOptions& o, std::span<const BufferCamera> cameras, const JobCallbacks& callbacks)
+// the path that lies beside buffers, if it is theirs. bad_input: it cannot be read
+Status take_path_beside(RefinementOptions& o, std::span<const BufferCamera> cameras, const JobCallbacks& callbacks)
 {
     const Path file = o.input / "transforms.json";
     if (!is_file(file))
-        return;
-    Result<CameraPath> path = read_transforms(file);
+        return {};
+    SR_TRY(const Json json, read_json(file));
+    Result<CameraPath> path = parse_transforms(json, quote_path(file), {}, o.input);
     const Status fits = path ? check_against_path(cameras, *path) : tl::make_unexpected(path.error());
     if (fits)
         o.path = std::move(*path);
     else if (callbacks.warning)
         callbacks.warning(fmt::format("{} is not used: {}", quote_path(file), fits.error().message));
+    return {};
 }
 
 // the cameras, their frames and what came before those
@@ -92,7 +94,7 @@ Status find_cameras(Refinement& r, const JobCallbacks& callbacks)
     if (path_given)
         SR_CHECK(check_against_path(cameras, *o.path));
     else
-        take_path_beside(r.options, cameras, callbacks);
+        SR_CHECK(take_path_beside(r.options, cameras, callbacks));
     for (const BufferCamera& camera : cameras) {
         if (o.size && !path_given && camera.size != *o.size)
             return fail(ErrorCode::bad_input, "the pictures in {} are {} x {} pixels, `width` and `height` say {} x {}",

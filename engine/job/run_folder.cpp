@@ -202,8 +202,8 @@ std::vector<std::string> RunFolder::names() const
     return names;
 }
 
-// removes what an earlier run left: only names that runs make
-Status RunFolder::start()
+// only names that runs make
+void RunFolder::remove_contents() const
 {
     std::error_code ignored;
     for (const auto* names : {&contents_.pieces, &contents_.results})
@@ -213,6 +213,11 @@ Status RunFolder::start()
         remove_numbered(path_ / name);
     fs::remove(path_ / "journal.jsonl", ignored);
     fs::remove(path_ / "run.json", ignored);
+}
+
+Status RunFolder::start()
+{
+    remove_contents(); // of an earlier run
     return write_file_atomically(path_ / "run.json",
                                  json_text(Json{{"settings", settings_}, {"state", "running"}}, 1) + "\n");
 }
@@ -255,16 +260,11 @@ Status RunFolder::append(const Json& entry)
 
 void RunFolder::drop_if_empty()
 {
-    if (appended_ || !entries_.empty())
+    if (appended_ || !entries_.empty() || results_)
         return;
+    remove_contents(); // what nobody can go on from
     std::error_code ignored;
-    for (const char* name : {"run.json", "journal.jsonl", "lock"})
-        fs::remove(path_ / name, ignored);
-    for (const auto* names : {&contents_.pieces, &contents_.results})
-        for (const std::string& name : *names)
-            fs::remove(path_ / name, ignored); // a file, or a folder that is empty
-    for (const std::string& name : contents_.numbered)
-        remove_numbered(path_ / name);
+    fs::remove(path_ / "lock", ignored);
     fs::remove(path_, ignored); // stays if it holds anything else
 }
 

@@ -44,7 +44,8 @@ class RunFolder {
     Status append(const Json& entry); // on the disk when it returns
     // Adds `results` to run.json and removes the pieces.
     Status finish(const Json& results);
-    // After an error: removes the folder, and files among the results, if the run has no piece yet.
+    // After an error: removes the folder's contents, and the folder if it holds nothing else, if the run has no piece
+    // yet
     void drop_if_empty();
 
   private:
@@ -52,6 +53,7 @@ class RunFolder {
     Status refuse_links() const;
     Status lock();
     Status read_journal();
+    void remove_contents() const;
     Status start();
     std::vector<std::string> names() const; // of all contents
 

@@ -49,6 +49,8 @@ v 0 4 0
 f 1 2 3 4
 """
 
+BOX = "Car 0.00 0 -1.58 587.01 173.33 614.12 200.12 1.65 1.67 3.64 -0.65 1.71 16.70 -1.59\n"  # a line of KITTI's
+
 # what the others read, in the order in which it is made
 INPUTS = (
     f"generate in/labels.sgrid -m in/model {POINTS} -o in/points.sgrid",
@@ -67,6 +69,7 @@ GOES_ON = {
         f"generate in/labels.sgrid -m in/model {POINTS} --along in/ahead.tum --horizon 1 --tile-size 3 -o out/tiles",
     "render": f"render in/points.sgrid {SIZE} --npy --top -o out/drawn",
     "refine": f"refine in/points.sgrid {SIZE} -m in/model --steps 1 -o out/refined",
+    "refine_buffers": "refine in/drawn -m in/model --steps 1 -o out/refined",
     "edit": f"edit in/points.sgrid -m in/model --remove building {POINTS} -o out/edited.sgrid",
     "inpaint": f"inpaint in/points.sgrid -m in/model --class building {POINTS} --seeds 1,2 -o out/inpainted.sgrid",
     "run": "run in/job.toml",
@@ -92,6 +95,9 @@ BEGINS_AGAIN = {
     "convert_model": "convert in/model out/model --dtype f16",
     "convert_scene": "convert in/points.sgrid out/points.ply",
     "convert_path": "convert in/ahead.tum out/ahead.json",
+    "convert_colmap": "convert in/ahead.tum out/colmap --path-format colmap --points in/points.sgrid --images in/drawn",
+    "convert_boxes": "convert in/000000.txt out/objects.json --from kitti-boxes",
+    "streets": "streets -o out/street --length 30 --voxel-size 2 --points 1 --images --samples 1 --spacing 20 -W 16 -H 8",
     "labels": "labels --vox out/palette.vox",
     "profile": f"generate in/labels.sgrid -m in/model {POINTS} --profile out/profile.json -o out/points.sgrid",
     "video": f"render in/points.sgrid {SIZE} --video out/drive.mp4 -o out/drawn",
@@ -131,6 +137,7 @@ class SmallWork:
         write_conditioning(self.input / "model/conditioning")
         write_labels(self.input / "labels.sgrid", 2, 6)
         (self.input / "mesh.obj").write_text(MESH)
+        (self.input / "000000.txt").write_text(BOX)
         (self.input / "ahead.tum").write_text("".join(f"{x} {x} 1.8 1.6 -0.5 0.5 -0.5 0.5\n" for x in (0.2, 0.8)))
         (self.input / "job.toml").write_text(JOB.format(layout="folder", more=""))
         (self.input / "shards.toml").write_text(JOB.format(layout="shards", more='buffers = ["color", "depth"]'))

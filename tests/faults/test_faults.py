@@ -32,6 +32,8 @@ SLOWER = ("generate_along", "edit", "run")
 LOOKS = ("open", "list", "entry", "stat", "mkdir")  # of the quick ones every call: what is not seen is left out
 # each was not survived once: a kind's first call for a path that holds this
 ONCE = {"render": (("write", "/out/drawn/color/"), ("stat", "/out/drawn/color")),
+        "refine": (("create", "/out/refined/buffers/"), ("flush", "/out/refined/latents")),
+        "refine_buffers": (("open", "/in/drawn/transforms.json"),),
         "generate_along": (("create", "/out/tiles/."), ("stat", "/in/ahead.tum"), ("list", "/out/tiles")),
         "export_transforms": (("stat", "/in/drawn/label/000000.npy"), ("stat", "/in/drawn/depth/000001.png")),
         "export_colmap": (("mkdir", "/sparse/0"),)}
