@@ -295,8 +295,10 @@ Status DrawingStore::finish(const Json& results)
 
 Status DrawingStore::restore_boxes() const
 {
+    if (!files_.boxes)
+        return {};
     SR_TRY(const FileType type, examine(run_.path() / kBoxesName));
-    return files_.boxes && type != FileType::regular ? files_.boxes->write(run_.path()) : Status();
+    return type == FileType::regular ? Status() : files_.boxes->write(run_.path());
 }
 
 } // namespace semrover

@@ -26,7 +26,6 @@
 #include <algorithm>
 #include <CLI/CLI.hpp>
 #include <cmath>
-#include <set>
 
 namespace semrover {
 
@@ -435,8 +434,11 @@ Result<InspectedFiles> sort_out(const InspectArguments& o)
         return fail(ErrorCode::usage, "--path, or two files, of which one is a trajectory");
     if (!o.path.empty())
         return InspectedFiles{o.path, o.file};
-    SR_TRY(const std::optional<FoundPath> found, find_path(o.file));
-    const bool first = o.input.from.empty() && found;
+    bool first = false;
+    if (o.input.from.empty()) {
+        SR_TRY(const std::optional<FoundPath> found, find_path(o.file));
+        first = found.has_value();
+    }
     if (o.other.empty())
         return first ? InspectedFiles{o.file, {}} : InspectedFiles{{}, o.file};
     return first ? InspectedFiles{o.file, o.other} : InspectedFiles{o.other, o.file};
